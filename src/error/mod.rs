@@ -1,0 +1,130 @@
+//! One error type: a kind, the particle it concerns, and the numbers that broke the rule.
+
+mod kinds;
+
+pub use kinds::{
+    ApplyError, DomainError, KernelError, MultiIndexError, NeighborError, OperatorError, ParticleError, TimeError,
+};
+
+use std::fmt;
+
+/// What every fallible function of the crate returns.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Why a call was refused. A failing call changes nothing but the contents of an `out` buffer.
+///
+/// ```
+/// use parops::{Epsilon, Error, ErrorKind, ParticleError};
+/// let error: Error = Epsilon::global(-1.0).unwrap_err();
+/// assert_eq!(*error.kind(), ErrorKind::Particle(ParticleError::Epsilon { epsilon: -1.0 }));
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Error {
+    kind: ErrorKind,
+    particle: Option<usize>,
+}
+
+impl Error {
+    /// An error of the given kind that concerns no particle in particular.
+    pub fn new(kind: impl Into<ErrorKind>) -> Self {
+        Self { kind: kind.into(), particle: None }
+    }
+
+    /// An error of the user's own, for right-hand sides, providers and methods outside this crate.
+    ///
+    /// `code` is handed back unchanged in [`ErrorKind::User`].
+    pub fn user(code: i64) -> Self {
+        Self { kind: ErrorKind::User { code }, particle: None }
+    }
+
+    /// Names the particle (or target) concerned.
+    #[must_use]
+    pub fn at(mut self, particle: usize) -> Self {
+        self.particle = Some(particle);
+        self
+    }
+
+    /// What went wrong, with its numbers.
+    pub fn kind(&self) -> &ErrorKind {
+        &self.kind
+    }
+
+    /// The particle (or target) it went wrong at, in the caller's numbering.
+    pub fn particle(&self) -> Option<usize> {
+        self.particle
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(particle) = self.particle {
+            write!(f, "particle {particle}: ")?;
+        }
+        match &self.kind {
+            ErrorKind::MultiIndex(kind) => kind.fmt(f),
+            ErrorKind::Kernel(kind) => kind.fmt(f),
+            ErrorKind::Domain(kind) => kind.fmt(f),
+            ErrorKind::Particle(kind) => kind.fmt(f),
+            ErrorKind::Neighbor(kind) => kind.fmt(f),
+            ErrorKind::Operator(kind) => kind.fmt(f),
+            ErrorKind::Apply(kind) => kind.fmt(f),
+            ErrorKind::Time(kind) => kind.fmt(f),
+            ErrorKind::User { code } => write!(f, "the caller's own error, code {code}"),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+/// The kinds of [`Error`], grouped by the layer that refuses.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// Multi-indices, degrees and orders.
+    MultiIndex(MultiIndexError),
+    /// Kernels and their derivation.
+    Kernel(KernelError),
+    /// Domains and their faces.
+    Domain(DomainError),
+    /// Positions, volumes, strengths, epsilon.
+    Particle(ParticleError),
+    /// Neighbor providers.
+    Neighbor(NeighborError),
+    /// Methods that turn a stencil into weights.
+    Operator(OperatorError),
+    /// Applying rows to fields.
+    Apply(ApplyError),
+    /// Steppers and step limits.
+    Time(TimeError),
+    /// An error made by the caller's own code, see [`Error::user`].
+    User {
+        /// The number the caller chose.
+        code: i64,
+    },
+}
+
+macro_rules! from_kind {
+    ($($variant:ident: $kind:ident),* $(,)?) => { $(
+        impl From<$kind> for ErrorKind {
+            fn from(kind: $kind) -> Self {
+                ErrorKind::$variant(kind)
+            }
+        }
+        impl From<$kind> for Error {
+            fn from(kind: $kind) -> Self {
+                Error::new(kind)
+            }
+        }
+    )* };
+}
+
+from_kind! {
+    MultiIndex: MultiIndexError,
+    Kernel: KernelError,
+    Domain: DomainError,
+    Particle: ParticleError,
+    Neighbor: NeighborError,
+    Operator: OperatorError,
+    Apply: ApplyError,
+    Time: TimeError,
+}

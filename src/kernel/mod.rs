@@ -1,0 +1,84 @@
+//! Kernels: smoothing W, exchange eta^beta. A kernel is unscaled (epsilon = 1); methods scale it.
+
+use crate::error::Result;
+use crate::multi_index::{MultiIndex, Term};
+use crate::scalar::Scalar;
+
+/// A kernel eta(z), z = (x_p - x_q)/epsilon, that approximates a differential operator of one degree.
+///
+/// With eta_epsilon(x) = epsilon^-D eta(x/epsilon), the integral
+/// epsilon^-m Int (f(y) -/+ f(x)) eta_epsilon(x - y) dy approximates L f(x) = sum_i c_i D^beta_i f(x), m = |beta_i|,
+/// to O(epsilon^r), because the moments M_alpha = Int z^alpha eta(z) dz are (-1)^m c_i beta_i! for alpha = beta_i and
+/// zero for the other 1 <= |alpha| <= m + r - 1 (from |alpha| = 0 where m = 0).
+///
+/// The scalar stands on the trait, so that `dyn Kernel<f64, 2>` exists and dual numbers pass through.
+/// Implement it for a kernel of your own and it can be used wherever ours are;
+/// `parops::testing::check_kernel` (feature `testing`) tells whether it keeps its promises.
+///
+/// Source: notes 001, eq. 5.30; notes 000, eq. 16 and 18; errata 10 for the argument.
+pub trait Kernel<T: Scalar, const D: usize>: Send + Sync {
+    /// eta(z).
+    fn value(&self, z: &[T; D]) -> T;
+
+    /// eta at many points; `out` is as long as `z`. Override it where many points are cheaper together.
+    fn values(&self, z: &[[T; D]], out: &mut [T]) {
+        for (z, out) in z.iter().zip(out) {
+            *out = self.value(z);
+        }
+    }
+
+    /// The terms c_i D^beta_i this kernel approximates, all of one degree m. A smoothing kernel has the one term D^0.
+    fn terms(&self) -> &[Term<D>];
+
+    /// The order r of the error O(epsilon^r) in integral form.
+    fn order(&self) -> u32;
+
+    /// The radius, in units of epsilon, at which the kernel is or may be cut off.
+    fn support(&self) -> f64;
+
+    /// The largest h/epsilon at which the sum over a lattice still replaces the integral.
+    fn overlap_limit(&self) -> f64;
+
+    /// Whether the Fourier transform of eta is nowhere negative, so that the matrix eta(x_p - x_q) has no negative
+    /// eigenvalue. It makes the step limit of errata 26 hold on any particle set.
+    fn positive_definite(&self) -> bool {
+        false
+    }
+}
+
+/// A smoothing kernel W: even, Int W = 1, differentiable.
+///
+/// Source: notes 001, sec. 5.1.
+pub trait SmoothingKernel<T: Scalar, const D: usize>: Kernel<T, D> {
+    /// D^beta W(z).
+    ///
+    /// # Errors
+    /// [`KernelError::Regularity`](crate::KernelError::Regularity) beyond the degree the kernel is differentiable to.
+    fn derivative(&self, beta: MultiIndex<D>, z: &[T; D]) -> Result<T>;
+
+    /// D^beta W at many points; `out` is as long as `z`. Override it where the work per call can be shared.
+    ///
+    /// # Errors
+    /// As [`derivative`](Self::derivative).
+    fn derivatives(&self, beta: MultiIndex<D>, z: &[[T; D]], out: &mut [T]) -> Result<()> {
+        for (z, out) in z.iter().zip(out) {
+            *out = self.derivative(beta, z)?;
+        }
+        Ok(())
+    }
+
+    /// grad W(z).
+    ///
+    /// # Errors
+    /// As [`derivative`](Self::derivative), for degree 1.
+    fn gradient(&self, z: &[T; D]) -> Result<[T; D]> {
+        let mut gradient = [T::zero(); D];
+        for (axis, component) in gradient.iter_mut().enumerate() {
+            *component = self.derivative(MultiIndex::unit(axis)?, z)?;
+        }
+        Ok(gradient)
+    }
+
+    /// The constant in front of the profile that makes Int W = 1.
+    fn normalization(&self) -> f64;
+}

@@ -1,0 +1,17 @@
+//! lib
+mod error;
+mod kernel;
+mod multi_index;
+mod neighbors;
+mod operator;
+mod scalar;
+mod scale;
+mod stencil;
+pub use error::*;
+pub use kernel::{Kernel, SmoothingKernel};
+pub use multi_index::*;
+pub use neighbors::{Canonical, Neighbors};
+pub use operator::*;
+pub use scalar::Scalar;
+pub use scale::{Cutoff, Epsilon, Spacing, Volumes};
+pub use stencil::{Neighbor, Stencil};

@@ -1,0 +1,75 @@
+//! Neighbor providers: who lies within the cutoff of whom.
+
+use crate::stencil::{Neighbor, Stencil};
+
+/// Answers, for every target p, which source particles (or images of them) lie within a cutoff.
+///
+/// Targets and sources may be different sets. A neighbor at exactly the cutoff is in. The center (the source that
+/// is target p) is not its own neighbor, but images of it behind periodic or mirror faces are.
+/// The order of a row is the provider's own, always the same for the same provider and set.
+/// A query beyond [`reach`](Self::reach) is answered up to the reach; operators check the reach before they ask.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is no provider of neighbors in {D} dimensions",
+    label = "expected a neighbor provider in {D} dimensions",
+    note = "the operator, the particles and the provider must agree on the number of dimensions"
+)]
+pub trait Neighbors<const D: usize>: Sync {
+    /// Number of targets.
+    fn targets(&self) -> usize;
+
+    /// Number of sources, owned first, then ghosts.
+    fn sources(&self) -> usize;
+
+    /// Number of sources this process owns; the rest are ghosts.
+    fn owned(&self) -> usize {
+        self.sources()
+    }
+
+    /// The source that is target p; `None` off the particles.
+    fn center(&self, p: usize) -> Option<usize>;
+
+    /// The cutoff r_c the provider was built with for target p.
+    fn cutoff(&self, p: usize) -> f64;
+
+    /// The largest cutoff a query may ask for.
+    fn reach(&self) -> f64;
+
+    /// The generation of the particle set this provider answers for.
+    fn generation(&self) -> u64;
+
+    /// Visits every neighbor of p with |x_p - x_q| <= `cutoff`, but the center.
+    fn for_each(&self, p: usize, cutoff: f64, visit: impl FnMut(Neighbor<D>))
+    where
+        Self: Sized;
+
+    /// Writes the neighbors of p within `cutoff` into `row`.
+    fn gather(&self, p: usize, cutoff: f64, row: &mut Stencil<D>)
+    where
+        Self: Sized,
+    {
+        row.reset(p, self.center(p), cutoff);
+        self.for_each(p, cutoff, |neighbor| row.push(neighbor));
+    }
+
+    /// How many neighbors p has within `cutoff`.
+    fn count(&self, p: usize, cutoff: f64) -> usize
+    where
+        Self: Sized,
+    {
+        let mut count = 0;
+        self.for_each(p, cutoff, |_| count += 1);
+        count
+    }
+
+    /// The same neighbors with every row sorted by separation, so that sums over a row do not depend on the
+    /// provider or the numbering. Sorting costs 0.6 to 4.6 microseconds a row.
+    fn canonical(self) -> Canonical<Self>
+    where
+        Self: Sized,
+    {
+        Canonical(self)
+    }
+}
+
+mod canonical;
+pub use canonical::Canonical;

@@ -1,0 +1,151 @@
+//! The one seam every discretization method implements: a stencil goes in, weights come out.
+
+use super::expression::Outputs;
+use crate::error::{Error, OperatorError, Result};
+use crate::stencil::Stencil;
+
+/// How a stencil becomes weights: the only trait a new method implements.
+///
+/// Weights w_pq and diagonal d_p mean
+/// out_p = d_p f_p + sum_q w_pq (f_q - f_p) where the target is a particle, and
+/// out_p = sum_q w_pq f_q where it is not; f_q is the value of the source, so the sign of a mirror image is already
+/// in w_pq and d_p ([`spread`] does that).
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is no discretization method in {D} dimensions",
+    label = "expected a method in {D} dimensions",
+    note = "the method and the neighbor provider must agree on the number of dimensions"
+)]
+pub trait Method<const D: usize>: Sync {
+    /// `[f64; K]`: K weights per pair.
+    type Out: Outputs;
+    /// Working memory for one row, made once and reused.
+    type Scratch: Send;
+
+    /// Makes working memory; the only allocation.
+    ///
+    /// # Errors
+    /// Where a parameter of the method is illegal.
+    fn scratch(&self) -> Result<Self::Scratch>;
+
+    /// The cutoff this method wants for target p; `None` takes the provider's.
+    ///
+    /// # Errors
+    /// Where the method holds no data for p.
+    fn cutoff(&self, p: usize) -> Result<Option<f64>> {
+        let _ = p;
+        Ok(None)
+    }
+
+    /// The weights of one target. `w` is as long as the stencil; `w` and `diagonal` are written whole.
+    ///
+    /// # Errors
+    /// Where no weights exist for this stencil. A row that exists but is poor is no error: it is reported as a
+    /// [`Breach`], and the build decides.
+    fn weights(
+        &self,
+        row: &Stencil<D>,
+        scratch: &mut Self::Scratch,
+        w: &mut [Self::Out],
+        diagonal: &mut Self::Out,
+    ) -> Result<RowReport>;
+}
+
+/// What is known about one row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RowReport {
+    /// The target.
+    pub target: usize,
+    /// Number of neighbors n.
+    pub neighbors: usize,
+    /// h/epsilon, with h = V^(1/D).
+    pub h_over_epsilon: f64,
+    /// Relative defect of the discrete moments.
+    pub moment_defect: f64,
+    /// sum_q |w_pq|, the largest over the outputs, in units of the operator.
+    pub sum_abs: f64,
+    /// Weights whose sign differs from that of their sum, for even operators of one output.
+    pub wrong_sign: usize,
+    /// A bound this row sets on the modulus of the eigenvalues of the operator.
+    pub spectral_bound: f64,
+    /// The limit this row breaks, if any.
+    pub breach: Option<Breach>,
+    /// Whether the caller allowed this row to break it.
+    pub allowed: bool,
+}
+
+/// A limit that a row breaks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Breach {
+    /// h/epsilon is above what the kernel bears.
+    Overlap {
+        /// h/epsilon.
+        h_over_epsilon: f64,
+        /// The largest legal value.
+        limit: f64,
+    },
+    /// The discrete moments miss their conditions.
+    Moment {
+        /// The relative defect.
+        defect: f64,
+        /// The largest legal value.
+        limit: f64,
+    },
+}
+
+impl Breach {
+    /// How many times the limit was reached; above 1, and infinite for NaN.
+    pub fn severity(&self) -> f64 {
+        let ratio = match *self {
+            Self::Overlap { h_over_epsilon, limit } => h_over_epsilon / limit,
+            Self::Moment { defect, limit } => defect / limit,
+        };
+        if ratio.is_nan() { f64::INFINITY } else { ratio }
+    }
+
+    /// The error a build fails with when this breach is not allowed.
+    pub fn refuse(&self, particle: usize) -> Error {
+        let kind = match *self {
+            Self::Overlap { h_over_epsilon, limit } => OperatorError::Overlap { h_over_epsilon, limit },
+            Self::Moment { defect, limit } => OperatorError::Moment { defect, limit },
+        };
+        Error::from(kind).at(particle)
+    }
+}
+
+/// Where a caller allows a breach of the overlap and moment limits.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Allowance {
+    /// Nowhere: a breach fails the build.
+    #[default]
+    Nowhere,
+    /// At these targets, sorted.
+    At(Vec<usize>),
+    /// Everywhere; the report still says where.
+    Everywhere,
+}
+
+impl Allowance {
+    /// At these targets, in any order.
+    pub fn at(targets: impl IntoIterator<Item = usize>) -> Self {
+        let mut targets: Vec<_> = targets.into_iter().collect();
+        targets.sort_unstable();
+        Self::At(targets)
+    }
+
+    /// Whether it covers target p.
+    pub fn covers(&self, p: usize) -> bool {
+        match self {
+            Self::Nowhere => false,
+            Self::At(targets) => targets.binary_search(&p).is_ok(),
+            Self::Everywhere => true,
+        }
+    }
+}
+
+/// Splits a pair term a s f_q + b f_p into its weight on (f_q - f_p) and its part of the diagonal:
+/// a s f_q + b f_p = (a s) (f_q - f_p) + (a s + b) f_p, where s is the sign of the image.
+#[inline(always)]
+pub fn spread(a: f64, b: f64, sign: i8) -> (f64, f64) {
+    let w = a * f64::from(sign);
+    (w, w + b)
+}

@@ -1,0 +1,118 @@
+//! The neighbors of one particle, as offsets: all that a method ever sees of the geometry.
+
+/// One neighbor of a target p.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Neighbor<const D: usize> {
+    /// Index of the source particle whose position or image this is.
+    pub q: usize,
+    /// x_p - x_q, with x_q the image meant.
+    pub separation: [f64; D],
+    /// +1, or -1 for an image behind an odd number of odd mirrors, where the field changes sign.
+    pub sign: i8,
+}
+
+/// The neighbors of one target, gathered into flat arrays that are reused from target to target.
+///
+/// The target's own particle, its center, is not among the neighbors; images of it may be.
+///
+/// ```
+/// use parops::{Neighbor, Stencil};
+/// let mut row = Stencil::<1>::default();
+/// row.reset(7, Some(7), 0.5);
+/// row.push(Neighbor { q: 3, separation: [0.25], sign: 1 });
+/// assert_eq!((row.target(), row.len(), row.separations()[0]), (7, 1, [0.25]));
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct Stencil<const D: usize> {
+    target: usize,
+    center: Option<usize>,
+    cutoff: f64,
+    sources: Vec<u32>,
+    separations: Vec<[f64; D]>,
+    signs: Vec<i8>,
+}
+
+impl<const D: usize> Stencil<D> {
+    /// Empties the stencil and names the target it is about to hold; its allocations are kept.
+    ///
+    /// `center` is the source particle that is the target, or `None` off the particles.
+    pub fn reset(&mut self, target: usize, center: Option<usize>, cutoff: f64) {
+        (self.target, self.center, self.cutoff) = (target, center, cutoff);
+        self.sources.clear();
+        self.separations.clear();
+        self.signs.clear();
+    }
+
+    /// Adds a neighbor. Providers hold fewer than 2^32 sources, so that an index fits 32 bits.
+    #[inline(always)]
+    pub fn push(&mut self, neighbor: Neighbor<D>) {
+        self.sources.push(neighbor.q as u32);
+        self.separations.push(neighbor.separation);
+        self.signs.push(neighbor.sign);
+    }
+
+    /// Index p of the target.
+    pub fn target(&self) -> usize {
+        self.target
+    }
+
+    /// The source that is the target, or `None` off the particles.
+    pub fn center(&self) -> Option<usize> {
+        self.center
+    }
+
+    /// The cutoff r_c the neighbors were asked with.
+    pub fn cutoff(&self) -> f64 {
+        self.cutoff
+    }
+
+    /// Number of neighbors.
+    pub fn len(&self) -> usize {
+        self.sources.len()
+    }
+
+    /// Whether there is no neighbor.
+    pub fn is_empty(&self) -> bool {
+        self.sources.is_empty()
+    }
+
+    /// Source indices q.
+    pub fn sources(&self) -> &[u32] {
+        &self.sources
+    }
+
+    /// Separations x_p - x_q.
+    pub fn separations(&self) -> &[[f64; D]] {
+        &self.separations
+    }
+
+    /// Signs of the images.
+    pub fn signs(&self) -> &[i8] {
+        &self.signs
+    }
+
+    /// The neighbors one by one.
+    pub fn iter(&self) -> impl Iterator<Item = Neighbor<D>> + '_ {
+        (0..self.len()).map(|i| Neighbor {
+            q: self.sources[i] as usize,
+            separation: self.separations[i],
+            sign: self.signs[i],
+        })
+    }
+
+    /// Sorts the neighbors by separation (axis by axis, then sign, then source), which fixes the order of
+    /// summation whatever the provider and the numbering: M7 of the metamorphic relations.
+    pub fn sort(&mut self) {
+        let mut all: Vec<Neighbor<D>> = self.iter().collect();
+        all.sort_unstable_by(|a, b| {
+            let axes = a.separation.iter().zip(&b.separation).map(|(x, y)| x.total_cmp(y));
+            axes.fold(std::cmp::Ordering::Equal, |known, axis| known.then(axis))
+                .then(a.sign.cmp(&b.sign))
+                .then(a.q.cmp(&b.q))
+        });
+        self.reset(self.target, self.center, self.cutoff);
+        for neighbor in all {
+            self.push(neighbor);
+        }
+    }
+}
