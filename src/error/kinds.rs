@@ -360,6 +360,13 @@ kinds! {
             /// The degree.
             degree: u32,
         } => "the sign '+' belongs to odd degrees, not to {degree}",
+        /// A degree the method does not serve.
+        Degree {
+            /// The degree.
+            degree: u32,
+            /// The smallest legal degree.
+            low: u32,
+        } => "degree {degree} is below {low}",
         /// A tolerance, limit or radius that is not positive.
         Setting {
             /// The value.

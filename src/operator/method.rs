@@ -8,8 +8,8 @@ use crate::stencil::Stencil;
 ///
 /// Weights w_pq and diagonal d_p mean
 /// out_p = d_p f_p + sum_q w_pq (f_q - f_p) where the target is a particle, and
-/// out_p = sum_q w_pq f_q where it is not; f_q is the value of the source, so the sign of a mirror image is already
-/// in w_pq and d_p ([`spread`] does that).
+/// out_p = sum_q w_pq f_q where it is not. Here f_q is the value of the source itself: the sign of a mirror image is
+/// already in w_pq and d_p, and [`spread`] puts it there.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is no discretization method in {D} dimensions",
     label = "expected a method in {D} dimensions",
@@ -39,19 +39,32 @@ pub trait Method<const D: usize>: Sync {
     /// The weights of one target. `w` is as long as the stencil; `w` and `diagonal` are written whole.
     ///
     /// # Errors
-    /// Where no weights exist for this stencil. A row that exists but is poor is no error: it is reported as a
-    /// [`Breach`], and the build decides.
+    /// Where no weights exist for this stencil. A row that exists but is poor is no error here: [`report`](Self::report)
+    /// says so, and the build decides.
     fn weights(
         &self,
         row: &Stencil<D>,
         scratch: &mut Self::Scratch,
         w: &mut [Self::Out],
         diagonal: &mut Self::Out,
+    ) -> Result<()>;
+
+    /// What is known about the row that [`weights`](Self::weights) has just written with the same scratch.
+    ///
+    /// # Errors
+    /// Where the method holds no data for the row.
+    fn report(
+        &self,
+        row: &Stencil<D>,
+        scratch: &Self::Scratch,
+        w: &[Self::Out],
+        diagonal: &Self::Out,
     ) -> Result<RowReport>;
 }
 
 /// What is known about one row.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct RowReport {
     /// The target.
     pub target: usize,
@@ -61,11 +74,11 @@ pub struct RowReport {
     pub h_over_epsilon: f64,
     /// Relative defect of the discrete moments.
     pub moment_defect: f64,
-    /// sum_q |w_pq|, the largest over the outputs, in units of the operator.
+    /// |d_p| + sum_q |w_pq|, the largest over the outputs: the gain of noise, in units of the operator.
     pub sum_abs: f64,
-    /// Weights whose sign differs from that of their sum, for even operators of one output.
-    pub wrong_sign: usize,
-    /// A bound this row sets on the modulus of the eigenvalues of the operator.
+    /// Pairs whose weight is negative before the sign of an image; for a Laplacian each costs the maximum principle.
+    pub negative_weights: usize,
+    /// The bound this row sets on the modulus of the eigenvalues of the operator, in units of the operator.
     pub spectral_bound: f64,
     /// The limit this row breaks, if any.
     pub breach: Option<Breach>,
@@ -73,8 +86,36 @@ pub struct RowReport {
     pub allowed: bool,
 }
 
+impl RowReport {
+    /// A report of a row without defects; a method fills in what it knows.
+    ///
+    /// `sum_abs` and the general bound 2 `sum_abs` on the eigenvalues (Gershgorin) are taken from the weights.
+    pub fn of<const D: usize, S: Outputs>(row: &Stencil<D>, w: &[S], diagonal: &S) -> Self {
+        let gain =
+            |k: usize| w.iter().fold(diagonal.as_slice()[k].abs(), |sum, weight| sum + weight.as_slice()[k].abs());
+        let sum_abs = (0..S::K).map(gain).fold(0.0, f64::max);
+        Self {
+            target: row.target(),
+            neighbors: row.len(),
+            h_over_epsilon: 0.0,
+            moment_defect: 0.0,
+            sum_abs,
+            negative_weights: 0,
+            spectral_bound: 2.0 * sum_abs,
+            breach: None,
+            allowed: false,
+        }
+    }
+
+    /// How badly the row breaks its limits: above 1 where it does, otherwise 0.
+    pub fn severity(&self) -> f64 {
+        self.breach.map_or(0.0, |breach| breach.severity())
+    }
+}
+
 /// A limit that a row breaks.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Breach {
     /// h/epsilon is above what the kernel bears.
     Overlap {
@@ -93,7 +134,7 @@ pub enum Breach {
 }
 
 impl Breach {
-    /// How many times the limit was reached; above 1, and infinite for NaN.
+    /// How many times the limit was reached; infinite for NaN.
     pub fn severity(&self) -> f64 {
         let ratio = match *self {
             Self::Overlap { h_over_epsilon, limit } => h_over_epsilon / limit,
@@ -103,22 +144,22 @@ impl Breach {
     }
 
     /// The error a build fails with when this breach is not allowed.
-    pub fn refuse(&self, particle: usize) -> Error {
+    pub fn refuse(&self, target: usize) -> Error {
         let kind = match *self {
             Self::Overlap { h_over_epsilon, limit } => OperatorError::Overlap { h_over_epsilon, limit },
             Self::Moment { defect, limit } => OperatorError::Moment { defect, limit },
         };
-        Error::from(kind).at(particle)
+        Error::from(kind).at(target)
     }
 }
 
-/// Where a caller allows a breach of the overlap and moment limits.
+/// Where a caller allows rows to break their limits.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Allowance {
     /// Nowhere: a breach fails the build.
     #[default]
     Nowhere,
-    /// At these targets, sorted.
+    /// At these targets, sorted; see [`Allowance::at`].
     At(Vec<usize>),
     /// Everywhere; the report still says where.
     Everywhere,
@@ -142,8 +183,13 @@ impl Allowance {
     }
 }
 
-/// Splits a pair term a s f_q + b f_p into its weight on (f_q - f_p) and its part of the diagonal:
-/// a s f_q + b f_p = (a s) (f_q - f_p) + (a s + b) f_p, where s is the sign of the image.
+/// Splits the pair term a s f_q + b f_p into its weight on (f_q - f_p) and its share of the diagonal,
+/// (a s) (f_q - f_p) + (a s + b) f_p, where s is the sign of the image.
+///
+/// ```
+/// assert_eq!(parops::spread(2.0, -2.0, 1), (2.0, 0.0));
+/// assert_eq!(parops::spread(2.0, -2.0, -1), (-2.0, -4.0));
+/// ```
 #[inline(always)]
 pub fn spread(a: f64, b: f64, sign: i8) -> (f64, f64) {
     let w = a * f64::from(sign);

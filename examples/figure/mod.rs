@@ -1,0 +1,182 @@
+//! Figures of the examples: curves with markers, on linear or logarithmic axes, as SVG.
+
+use std::error::Error;
+use std::path::Path;
+
+use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
+use plotters::prelude::*;
+
+/// One curve.
+pub struct Curve {
+    /// Its name in the legend; no entry where empty.
+    pub name: String,
+    /// Its points.
+    pub points: Vec<(f64, f64)>,
+    /// How they are drawn.
+    pub mark: Mark,
+    /// Index into the palette.
+    pub color: usize,
+}
+
+/// How the points of a curve are drawn.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Mark {
+    Line,
+    Dashed,
+    Circles,
+    Triangles,
+    Crosses,
+    CirclesAlone,
+}
+
+/// Titles and kind of axes of one panel.
+pub struct Axes<'a> {
+    pub title: &'a str,
+    pub x: &'a str,
+    pub y: &'a str,
+    pub logarithmic: bool,
+}
+
+const SIZE: (u32, u32) = (760, 560);
+const PALETTE: [RGBColor; 8] = [
+    RGBColor(31, 87, 166),
+    RGBColor(206, 77, 38),
+    RGBColor(35, 133, 72),
+    RGBColor(122, 62, 157),
+    RGBColor(20, 20, 20),
+    RGBColor(178, 130, 0),
+    RGBColor(0, 139, 149),
+    RGBColor(130, 130, 130),
+];
+
+/// Draws panels side by side into one SVG file.
+pub fn draw(path: &Path, panels: &[(Axes, Vec<Curve>)]) -> Result<(), Box<dyn Error>> {
+    let width = SIZE.0 * panels.len() as u32;
+    let root = SVGBackend::new(path, (width, SIZE.1)).into_drawing_area();
+    root.fill(&WHITE)?;
+    for ((axes, curves), area) in panels.iter().zip(root.split_evenly((1, panels.len()))) {
+        let [x, y] = [bounds(curves, axes.logarithmic, |p| p.0), bounds(curves, axes.logarithmic, |p| p.1)];
+        if axes.logarithmic {
+            panel(&area, axes, curves, (x.0..x.1).log_scale(), (y.0..y.1).log_scale(), power_of_ten)?;
+        } else {
+            panel(&area, axes, curves, x.0..x.1, y.0..y.1, plain)?;
+        }
+    }
+    root.present()?;
+    Ok(())
+}
+
+fn panel<X, Y>(
+    area: &DrawingArea<SVGBackend, plotters::coord::Shift>,
+    axes: &Axes,
+    curves: &[Curve],
+    x: X,
+    y: Y,
+    label: fn(&f64) -> String,
+) -> Result<(), Box<dyn Error>>
+where
+    X: AsRangedCoord<Value = f64>,
+    Y: AsRangedCoord<Value = f64>,
+    X::CoordDescType: ValueFormatter<f64>,
+    Y::CoordDescType: ValueFormatter<f64>,
+{
+    let mut chart = ChartBuilder::on(area)
+        .caption(axes.title, ("sans-serif", 20))
+        .margin(14)
+        .x_label_area_size(46)
+        .y_label_area_size(72)
+        .build_cartesian_2d(x, y)?;
+    chart
+        .configure_mesh()
+        .light_line_style(TRANSPARENT)
+        .x_desc(axes.x)
+        .y_desc(axes.y)
+        .x_label_formatter(&label)
+        .y_label_formatter(&label)
+        .label_style(("sans-serif", 15))
+        .axis_desc_style(("sans-serif", 17))
+        .draw()?;
+    for curve in curves {
+        let color = PALETTE[curve.color % PALETTE.len()];
+        let points = || curve.points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite());
+        if curve.mark == Mark::Dashed {
+            let dashes = DashedLineSeries::new(points(), 6, 5, color.stroke_width(1));
+            chart.draw_series(dashes)?;
+        } else if curve.mark != Mark::CirclesAlone {
+            chart.draw_series(LineSeries::new(points(), color.stroke_width(2)))?;
+        }
+        match curve.mark {
+            Mark::Circles | Mark::CirclesAlone => {
+                chart.draw_series(points().map(|p| Circle::new(p, 4, color.filled())))?;
+            }
+            Mark::Triangles => {
+                chart.draw_series(points().map(|p| TriangleMarker::new(p, 6, color.filled())))?;
+            }
+            Mark::Crosses => {
+                chart.draw_series(points().map(|p| Cross::new(p, 5, color.stroke_width(2))))?;
+            }
+            Mark::Line | Mark::Dashed => {}
+        }
+        if !curve.name.is_empty() {
+            let mark = curve.mark;
+            // An empty series carries the legend entry, so that every curve has one, whatever it is drawn with.
+            chart
+                .draw_series(LineSeries::new(std::iter::empty::<(f64, f64)>(), color))?
+                .label(&curve.name)
+                .legend(move |(x, y)| legend(x, y, mark, color));
+        }
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::LowerLeft)
+        .background_style(WHITE.mix(0.85))
+        .border_style(BLACK.mix(0.3))
+        .label_font(("sans-serif", 15))
+        .draw()?;
+    Ok(())
+}
+
+fn legend(x: i32, y: i32, mark: Mark, color: RGBColor) -> DynElement<'static, SVGBackend<'static>, (i32, i32)> {
+    let line = PathElement::new(vec![(x, y), (x + 22, y)], color.stroke_width(if mark == Mark::Dashed { 1 } else { 2 }));
+    match mark {
+        Mark::CirclesAlone => Circle::new((x + 11, y), 4, color.filled()).into_dyn(),
+        Mark::Circles => (EmptyElement::at((x, y))
+            + PathElement::new(vec![(0, 0), (22, 0)], color.stroke_width(2))
+            + Circle::new((11, 0), 4, color.filled()))
+        .into_dyn(),
+        Mark::Triangles => (EmptyElement::at((x, y))
+            + PathElement::new(vec![(0, 0), (22, 0)], color.stroke_width(2))
+            + TriangleMarker::new((11, 0), 6, color.filled()))
+        .into_dyn(),
+        Mark::Crosses => (EmptyElement::at((x, y))
+            + PathElement::new(vec![(0, 0), (22, 0)], color.stroke_width(2))
+            + Cross::new((11, 0), 5, color.stroke_width(2)))
+        .into_dyn(),
+        Mark::Line | Mark::Dashed => line.into_dyn(),
+    }
+}
+
+/// The range of all points with a margin, in the measure of the axis.
+fn bounds(curves: &[Curve], logarithmic: bool, coordinate: impl Fn(&(f64, f64)) -> f64) -> (f64, f64) {
+    let values = curves.iter().flat_map(|curve| &curve.points).map(coordinate).filter(|v| v.is_finite());
+    let (low, high) = values
+        .filter(|v| !logarithmic || *v > 0.0)
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+    if !(low <= high) {
+        return (0.1, 1.0);
+    }
+    if logarithmic {
+        (low / 1.6, high * 1.6)
+    } else {
+        let margin = 0.05 * (high - low).max(f64::MIN_POSITIVE);
+        (low - margin, high + margin)
+    }
+}
+
+fn power_of_ten(value: &f64) -> String {
+    if (0.1..10_000.0).contains(value) { format!("{value}") } else { format!("1e{:.0}", value.log10()) }
+}
+
+fn plain(value: &f64) -> String {
+    format!("{:.2}", value + 0.0)
+}

@@ -1,0 +1,203 @@
+//! A method and a provider become rows: counted first, then filled, block by block.
+
+use super::blocks::{BLOCK, each_block};
+use super::rows::{Centers, Rows};
+use super::{Field, MatrixFree, Report};
+use crate::error::{Error, NeighborError, Result};
+use crate::kernel::{Kernel, SmoothingKernel};
+use crate::neighbors::Neighbors;
+use crate::operator::{Method, Outputs, Pse, Sph};
+use crate::stencil::Stencil;
+
+impl<S: Outputs, T: Field> Rows<S, T> {
+    /// Builds the rows of `method` over `neighbors`, with weights rounded to `T`.
+    ///
+    /// Identical bits for any number of threads with one provider; with
+    /// [`canonical`](Neighbors::canonical) neighbors also over providers and after renumbering.
+    ///
+    /// # Errors
+    /// [`NeighborError::Reach`] naming the target whose cutoff is beyond the provider; what the method refuses; and
+    /// [`OperatorError::Overlap`](crate::OperatorError::Overlap) or
+    /// [`OperatorError::Moment`](crate::OperatorError::Moment) naming the worst row that breaks a limit without leave.
+    pub fn assemble<const D: usize, M: Method<D, Out = S>, P: Neighbors<D>>(method: &M, neighbors: &P) -> Result<Self> {
+        let targets = neighbors.targets();
+        let offsets = count(method, neighbors)?;
+        let pairs = offsets.last().copied().unwrap_or(0);
+        let zero = S::ZERO.map(T::lift);
+        let mut columns = vec![0_u32; pairs];
+        let mut weights = vec![zero; pairs];
+        let mut diagonal = vec![zero; targets];
+
+        let blocks = Blocks { offsets: &offsets, first: 0, columns: &mut columns, weights: &mut weights, diagonal: &mut diagonal };
+        let reports = each_block(blocks, |block| {
+            let mut worker = Worker::new(method)?;
+            let mut report = Report::default();
+            for (i, diagonal) in block.diagonal.iter_mut().enumerate() {
+                let p = block.first + i;
+                worker.fill(method, neighbors, p)?;
+                let range = offsets[p] - offsets[block.first]..offsets[p + 1] - offsets[block.first];
+                block.columns[range.clone()].copy_from_slice(worker.row.sources());
+                for (stored, w) in block.weights[range].iter_mut().zip(&worker.weights) {
+                    *stored = w.map(T::lift);
+                }
+                *diagonal = worker.diagonal.map(T::lift);
+                report.add(&worker.report(method, p)?);
+            }
+            Ok(report)
+        })?;
+        let mut report = Report::default();
+        reports.iter().for_each(|block| report.merge(block));
+        report.accept()?;
+        if diagonal.iter().all(|d| *d == zero) {
+            diagonal = Vec::new();
+        }
+        let (sources, generation) = (neighbors.sources(), neighbors.generation());
+        Ok(Self { offsets, columns, weights, diagonal, centers: centers(neighbors), sources, generation, report })
+    }
+}
+
+/// The cutoff of target p: the method's own, or the provider's.
+fn cutoff<const D: usize, M: Method<D>, P: Neighbors<D>>(method: &M, neighbors: &P, p: usize) -> Result<f64> {
+    let cutoff = method.cutoff(p).map_err(|error| error.at(p))?.unwrap_or_else(|| neighbors.cutoff(p));
+    let reach = neighbors.reach();
+    if cutoff <= reach { Ok(cutoff) } else { Err(Error::from(NeighborError::Reach { cutoff, reach }).at(p)) }
+}
+
+/// Where each row begins.
+fn count<const D: usize, M: Method<D>, P: Neighbors<D>>(method: &M, neighbors: &P) -> Result<Vec<usize>> {
+    let targets = neighbors.targets();
+    let mut offsets = vec![0_usize; targets + 1];
+    each_block(offsets[1..].chunks_mut(BLOCK).enumerate(), |(b, counts)| {
+        for (i, count) in counts.iter_mut().enumerate() {
+            let p = b * BLOCK + i;
+            *count = neighbors.count(p, cutoff(method, neighbors, p)?);
+        }
+        Ok(())
+    })?;
+    let mut sum = 0;
+    for offset in &mut offsets {
+        sum += *offset;
+        *offset = sum;
+    }
+    Ok(offsets)
+}
+
+fn centers<const D: usize, P: Neighbors<D>>(neighbors: &P) -> Centers {
+    let targets = 0..neighbors.targets();
+    if targets.clone().all(|p| neighbors.center(p) == Some(p)) {
+        Centers::Same
+    } else {
+        Centers::Each(targets.map(|p| neighbors.center(p).map(|q| q as u32)).collect())
+    }
+}
+
+/// The stencil, scratch and weights one thread works with.
+pub(super) struct Worker<const D: usize, M: Method<D>> {
+    pub(super) row: Stencil<D>,
+    scratch: M::Scratch,
+    pub(super) weights: Vec<M::Out>,
+    pub(super) diagonal: M::Out,
+}
+
+impl<const D: usize, M: Method<D>> Worker<D, M> {
+    pub(super) fn new(method: &M) -> Result<Self> {
+        let diagonal = M::Out::ZERO;
+        Ok(Self { row: Stencil::default(), scratch: method.scratch()?, weights: Vec::new(), diagonal })
+    }
+
+    /// Makes the weights of target p.
+    pub(super) fn fill<P: Neighbors<D>>(&mut self, method: &M, neighbors: &P, p: usize) -> Result<()> {
+        neighbors.gather(p, cutoff(method, neighbors, p)?, &mut self.row);
+        self.weights.clear();
+        self.weights.resize(self.row.len(), M::Out::ZERO);
+        let filled = method.weights(&self.row, &mut self.scratch, &mut self.weights, &mut self.diagonal);
+        filled.map_err(|error| error.at(p))
+    }
+
+    /// What is known of the row just filled.
+    pub(super) fn report(&self, method: &M, p: usize) -> Result<crate::operator::RowReport> {
+        let report = method.report(&self.row, &self.scratch, &self.weights, &self.diagonal);
+        report.map_err(|error| error.at(p))
+    }
+}
+
+/// The arrays of all rows, handed out block after block.
+struct Blocks<'a, W> {
+    offsets: &'a [usize],
+    first: usize,
+    columns: &'a mut [u32],
+    weights: &'a mut [W],
+    diagonal: &'a mut [W],
+}
+
+impl<'a, W> Iterator for Blocks<'a, W> {
+    type Item = Block<'a, W>;
+
+    fn next(&mut self) -> Option<Block<'a, W>> {
+        let first = self.first;
+        let rows = self.diagonal.len().min(BLOCK);
+        if rows == 0 {
+            return None;
+        }
+        self.first += rows;
+        let pairs = self.offsets[self.first] - self.offsets[first];
+        Some(Block {
+            first,
+            columns: self.columns.split_off_mut(..pairs)?,
+            weights: self.weights.split_off_mut(..pairs)?,
+            diagonal: self.diagonal.split_off_mut(..rows)?,
+        })
+    }
+}
+
+struct Block<'a, W> {
+    first: usize,
+    columns: &'a mut [u32],
+    weights: &'a mut [W],
+    diagonal: &'a mut [W],
+}
+
+impl<K, const N: usize> Pse<K, N> {
+    /// Builds the rows of this operator, with `f64` weights; [`Rows::assemble`] rounds them to another type.
+    ///
+    /// # Errors
+    /// As [`Rows::assemble`].
+    pub fn assemble<const D: usize, P: Neighbors<D>>(&self, neighbors: &P) -> Result<Rows<[f64; N]>>
+    where
+        K: Kernel<f64, D>,
+    {
+        Rows::assemble(self, neighbors)
+    }
+
+    /// The same operator without stored weights: they are computed anew in every application.
+    ///
+    /// # Errors
+    /// As [`Rows::assemble`].
+    pub fn matrix_free<'a, const D: usize, P: Neighbors<D>>(
+        &'a self,
+        neighbors: &'a P,
+    ) -> Result<MatrixFree<'a, D, Self, P>>
+    where
+        K: Kernel<f64, D>,
+    {
+        MatrixFree::new(self, neighbors)
+    }
+}
+
+impl<W: SmoothingKernel<f64, D>, const D: usize, const N: usize> Sph<W, D, N> {
+    /// Builds the rows of this operator, with `f64` weights; [`Rows::assemble`] rounds them to another type.
+    ///
+    /// # Errors
+    /// As [`Rows::assemble`].
+    pub fn assemble<P: Neighbors<D>>(&self, neighbors: &P) -> Result<Rows<[f64; N]>> {
+        Rows::assemble(self, neighbors)
+    }
+
+    /// The same operator without stored weights: they are computed anew in every application.
+    ///
+    /// # Errors
+    /// As [`Rows::assemble`].
+    pub fn matrix_free<'a, P: Neighbors<D>>(&'a self, neighbors: &'a P) -> Result<MatrixFree<'a, D, Self, P>> {
+        MatrixFree::new(self, neighbors)
+    }
+}

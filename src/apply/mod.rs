@@ -1,0 +1,55 @@
+//! Operators applied to fields: stored rows, or weights made anew for every application.
+
+mod assemble;
+mod blocks;
+mod matrix_free;
+mod report;
+mod rows;
+
+pub use matrix_free::MatrixFree;
+pub use report::Report;
+pub use rows::Rows;
+
+use num_traits::AsPrimitive;
+
+use crate::error::{ApplyError, Error, Result};
+use crate::scalar::Scalar;
+
+/// The number type of fields and stored weights: `f32` or `f64`.
+///
+/// Weights are always computed in `f64` and rounded to it once.
+pub trait Field: Scalar + Default + AsPrimitive<f64> {}
+
+impl Field for f32 {}
+impl Field for f64 {}
+
+/// A linear operator with one output, applied to a field: out_p = (L f)_p. Object-safe.
+pub trait Apply<T: Field>: Sync {
+    /// Number of values written: targets.
+    fn targets(&self) -> usize;
+
+    /// Number of values read: sources.
+    fn sources(&self) -> usize;
+
+    /// Writes L f into `out`. The order of summation is that of the rows, for any number of threads.
+    ///
+    /// # Errors
+    /// [`ApplyError::Input`] and [`ApplyError::Output`] for wrong lengths; [`ApplyError::Field`] naming the first
+    /// particle whose value is not finite. `out` is written only where all of that holds.
+    fn apply(&self, f: &[T], out: &mut [T]) -> Result<()>;
+}
+
+/// Checks a field and an output before anything is written.
+fn check<T: Field, In: AsRef<[T]>, Out>(f: &[In], sources: usize, out: &[Out], targets: usize) -> Result<()> {
+    if f.len() != sources {
+        return Err(ApplyError::Input { found: f.len(), needed: sources }.into());
+    }
+    if out.len() != targets {
+        return Err(ApplyError::Output { found: out.len(), needed: targets }.into());
+    }
+    let bad = |values: &In| values.as_ref().iter().copied().find(|x| !x.is_finite());
+    match f.iter().enumerate().find_map(|(p, values)| bad(values).map(|x| (p, x))) {
+        Some((p, value)) => Err(Error::from(ApplyError::Field { value: value.as_() }).at(p)),
+        None => Ok(()),
+    }
+}
