@@ -8,7 +8,7 @@ mod scalar;
 mod scale;
 mod stencil;
 pub use error::*;
-pub use kernel::{Kernel, SmoothingKernel};
+pub use kernel::{ExactPolynomial, Exchange, Kernel, Rational, SmoothingKernel};
 pub use multi_index::*;
 pub use neighbors::{Canonical, Neighbors};
 pub use operator::*;

@@ -86,11 +86,6 @@ kinds! {
             /// Highest degree the kernel is differentiable to.
             limit: u32,
         } => "the kernel has derivatives to degree {limit}, not {degree}",
-        /// The moment system of the kernel has no unique solution.
-        Singular {
-            /// Degree of the harmonic.
-            harmonic: u32,
-        } => "the moment conditions of harmonic {harmonic} have no unique solution",
     }
 }
 

@@ -1,5 +1,15 @@
 //! Kernels: smoothing W, exchange eta^beta. A kernel is unscaled (epsilon = 1); methods scale it.
 
+mod derivation;
+mod exchange;
+mod harmonic;
+mod polynomial;
+mod rational;
+
+pub use exchange::Exchange;
+pub use polynomial::ExactPolynomial;
+pub use rational::Rational;
+
 use crate::error::Result;
 use crate::multi_index::{MultiIndex, Term};
 use crate::scalar::Scalar;
@@ -81,4 +91,9 @@ pub trait SmoothingKernel<T: Scalar, const D: usize>: Kernel<T, D> {
 
     /// The constant in front of the profile that makes Int W = 1.
     fn normalization(&self) -> f64;
+}
+
+/// a^(-D/2), for the constant in front of a Gaussian.
+fn gaussian_constant<const D: usize>(a: f64) -> f64 {
+    (0..D).fold(1.0, |product, _| product / a.sqrt())
 }
