@@ -433,7 +433,7 @@ kinds! {
         } => "step {dt} is above the stability limit {limit}",
         /// A right-hand side or state that is not finite.
         NotFinite {
-            /// Stage of the stepper, from 1.
+            /// Stage of the stepper, from 1; one past the last for the new state.
             stage: usize,
             /// Time of the stage.
             t: f64,
