@@ -1,4 +1,5 @@
 //! lib
+mod apply;
 mod error;
 mod kernel;
 mod multi_index;
@@ -8,6 +9,7 @@ mod scalar;
 mod scale;
 mod stencil;
 mod time;
+pub use apply::{Apply, Field, MatrixFree, Report, Rows};
 pub use error::*;
 pub use kernel::{ExactPolynomial, Exchange, Kernel, Rational, SmoothingKernel};
 pub use multi_index::*;

@@ -28,7 +28,13 @@ impl<S: Outputs, T: Field> Rows<S, T> {
         let mut weights = vec![zero; pairs];
         let mut diagonal = vec![zero; targets];
 
-        let blocks = Blocks { offsets: &offsets, first: 0, columns: &mut columns, weights: &mut weights, diagonal: &mut diagonal };
+        let blocks = Blocks {
+            offsets: &offsets,
+            first: 0,
+            columns: &mut columns,
+            weights: &mut weights,
+            diagonal: &mut diagonal,
+        };
         let reports = each_block(blocks, |block| {
             let mut worker = Worker::new(method)?;
             let mut report = Report::default();

@@ -69,7 +69,11 @@ impl StepLimit {
     /// # Errors
     /// [`TimeError::Step`] where `dt` is not positive and finite.
     pub fn from_step(dt: f64) -> Result<Self> {
-        if dt > 0.0 && dt.is_finite() { Ok(Self { step: dt, ..Self::NONE }) } else { Err(TimeError::Step { dt }.into()) }
+        if dt > 0.0 && dt.is_finite() {
+            Ok(Self { step: dt, ..Self::NONE })
+        } else {
+            Err(TimeError::Step { dt }.into())
+        }
     }
 
     /// Both limits at once, each on its own.
