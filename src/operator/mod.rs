@@ -2,6 +2,10 @@
 
 mod expression;
 mod method;
+mod named;
+mod typed;
 
-pub use expression::{Along, Divergence, Expression, Gradient, Homogeneous, Laplacian, Operator, Outputs, Plus, Times};
+pub use expression::{Expression, Operator, Outputs, ShowSum, Value};
 pub use method::{Allowance, Breach, Method, RowReport};
+pub use named::{Along, Divergence, Gradient, Laplacian};
+pub use typed::{Homogeneous, Plus, Times};
