@@ -9,7 +9,7 @@ mod scalar;
 mod scale;
 mod stencil;
 mod time;
-pub use apply::{Apply, Field, MatrixFree, Report, Rows};
+pub use apply::{Apply, Field, MatrixFree, Report, Row, Rows};
 pub use error::*;
 pub use kernel::{ExactPolynomial, Exchange, Kernel, Rational, SmoothingKernel};
 pub use multi_index::*;

@@ -8,7 +8,7 @@ mod rows;
 
 pub use matrix_free::MatrixFree;
 pub use report::Report;
-pub use rows::Rows;
+pub use rows::{Row, Rows};
 
 use num_traits::AsPrimitive;
 

@@ -23,6 +23,17 @@ pub struct Rows<S: Outputs = [f64; 1], T: Field = f64> {
     pub(super) report: Report,
 }
 
+/// One stored row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row<'a, W> {
+    /// The neighbors q, in the order of summation; a source stands once for each of its images within the cutoff.
+    pub sources: &'a [u32],
+    /// Their weights w_pq.
+    pub weights: &'a [W],
+    /// The diagonal d_p.
+    pub diagonal: W,
+}
+
 /// Which source is target p.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Centers {
@@ -58,11 +69,11 @@ impl<S: Outputs, T: Field> Rows<S, T> {
         &self.report
     }
 
-    /// The neighbors q of target p, their weights w_pq, and the diagonal d_p; `None` beyond the targets.
-    pub fn row(&self, p: usize) -> Option<(&[u32], &[S::Of<T>], S::Of<T>)> {
+    /// Row p; `None` beyond the targets.
+    pub fn row(&self, p: usize) -> Option<Row<'_, S::Of<T>>> {
         let range = *self.offsets.get(p)?..*self.offsets.get(p + 1)?;
         let diagonal = self.diagonal.get(p).copied().unwrap_or_else(|| S::ZERO.map(T::lift));
-        Some((&self.columns[range.clone()], &self.weights[range], diagonal))
+        Some(Row { sources: &self.columns[range.clone()], weights: &self.weights[range], diagonal })
     }
 
     /// Bytes held by the rows.

@@ -81,9 +81,9 @@ impl<const D: usize> MultiIndex<D> {
     /// # Errors
     /// [`MultiIndexError::Degree`] where it does not fit 128 bits (34! is the last single factorial that does).
     pub fn factorial(&self) -> Result<u128> {
-        let factors = self.0.iter().flat_map(|&exponent| 1..=u128::from(exponent));
+        let mut factors = self.0.iter().flat_map(|&exponent| 1..=u128::from(exponent));
         factors
-            .fold(Some(1_u128), |product, factor| product?.checked_mul(factor))
+            .try_fold(1_u128, u128::checked_mul)
             .ok_or_else(|| MultiIndexError::Degree { degree: self.degree(), limit: 34 }.into())
     }
 

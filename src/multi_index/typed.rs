@@ -32,10 +32,20 @@ pub type D3<const A: usize, const B: usize, const C: usize> = Beta<TArr<U<A>, TA
 pub trait Exponents {
     /// |beta| as a type, so that a sum of unequal degree does not compile.
     type Degree: Unsigned;
+
+    /// Writes the exponents, separated by commas; `first` is false behind a comma.
+    ///
+    /// # Errors
+    /// Where the formatter fails.
+    fn show(f: &mut fmt::Formatter<'_>, first: bool) -> fmt::Result;
 }
 
 impl Exponents for ATerm {
     type Degree = U0;
+
+    fn show(_: &mut fmt::Formatter<'_>, _: bool) -> fmt::Result {
+        Ok(())
+    }
 }
 
 impl<A, Rest> Exponents for TArr<A, Rest>
@@ -45,6 +55,11 @@ where
     Sum<A, Rest::Degree>: Unsigned,
 {
     type Degree = Sum<A, Rest::Degree>;
+
+    fn show(f: &mut fmt::Formatter<'_>, first: bool) -> fmt::Result {
+        write!(f, "{}{}", if first { "" } else { "," }, A::U64)?;
+        Rest::show(f, false)
+    }
 }
 
 /// A list of exactly D exponents.
@@ -98,6 +113,13 @@ pub trait SameDegree<Other> {}
 
 impl<N> SameDegree<N> for N {}
 
+/// No degree at all. Were equality the only implementation, the compiler would infer the second degree from the
+/// first and answer a wrong sum with a type mismatch instead of the sentence above.
+#[derive(Clone, Copy, Debug)]
+pub enum NoDegree {}
+
+impl<N: Unsigned> SameDegree<NoDegree> for N {}
+
 impl<L> Beta<L> {
     /// The multi-index as a value.
     pub const fn index<const D: usize>() -> MultiIndex<D>
@@ -128,26 +150,7 @@ impl<L> Default for Beta<L> {
     }
 }
 
-/// Writes the exponents of a list, separated by commas, whatever its length.
-pub trait ShowList {
-    /// Writes this list; `first` is false behind a comma.
-    fn show(f: &mut fmt::Formatter<'_>, first: bool) -> fmt::Result;
-}
-
-impl ShowList for ATerm {
-    fn show(_: &mut fmt::Formatter<'_>, _: bool) -> fmt::Result {
-        Ok(())
-    }
-}
-
-impl<A: Unsigned, Rest: ShowList> ShowList for TArr<A, Rest> {
-    fn show(f: &mut fmt::Formatter<'_>, first: bool) -> fmt::Result {
-        write!(f, "{}{}", if first { "" } else { "," }, A::U64)?;
-        Rest::show(f, false)
-    }
-}
-
-impl<L: ShowList> fmt::Display for Beta<L> {
+impl<L: Exponents> fmt::Display for Beta<L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("D^(")?;
         L::show(f, true)?;
@@ -155,7 +158,7 @@ impl<L: ShowList> fmt::Display for Beta<L> {
     }
 }
 
-impl<L: ShowList> fmt::Debug for Beta<L> {
+impl<L: Exponents> fmt::Debug for Beta<L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(self, f)
     }

@@ -1,12 +1,14 @@
-//! What is asked for: typed and run-time expressions, which all lower to terms.
+//! What is asked for: an operator is a list of terms, and the run-time expression holds such a list.
 
 use std::fmt;
-use std::ops::{Add, Mul};
-
-use typenum::{U1, U2, Unsigned};
 
 use crate::error::{MultiIndexError, Result};
-use crate::multi_index::{Beta, Exponents, HasLen, MultiIndex, SameDegree, Term, common_degree};
+use crate::multi_index::{MultiIndex, Term, common_degree};
+
+/// What a weight can be: a plain value, such as `f32`, `f64` or an integer. Every such type is one.
+pub trait Value: Copy + Send + Sync + fmt::Debug + PartialEq + Default + 'static {}
+
+impl<T: Copy + Send + Sync + fmt::Debug + PartialEq + Default + 'static> Value for T {}
 
 /// The K values an operator has at one target: `[f64; K]`.
 pub trait Outputs: Copy + Send + Sync + fmt::Debug + PartialEq + 'static {
@@ -15,28 +17,19 @@ pub trait Outputs: Copy + Send + Sync + fmt::Debug + PartialEq + 'static {
     /// All outputs zero.
     const ZERO: Self;
     /// The same number of values of another scalar, as stored weights.
-    type Of<T: Copy + Send + Sync + fmt::Debug + PartialEq + Default + 'static>: Copy
-        + Send
-        + Sync
-        + fmt::Debug
-        + PartialEq
-        + AsRef<[T]>
-        + 'static;
+    type Of<T: Value>: Copy + Send + Sync + fmt::Debug + PartialEq + AsRef<[T]> + 'static;
     /// The values as a slice.
     fn as_slice(&self) -> &[f64];
     /// The values as a mutable slice.
     fn as_mut_slice(&mut self) -> &mut [f64];
     /// Converts value by value.
-    fn map<T: Copy + Send + Sync + fmt::Debug + PartialEq + Default + 'static>(
-        &self,
-        convert: impl Fn(f64) -> T,
-    ) -> Self::Of<T>;
+    fn map<T: Value>(&self, convert: impl Fn(f64) -> T) -> Self::Of<T>;
 }
 
 impl<const K: usize> Outputs for [f64; K] {
     const K: usize = K;
     const ZERO: Self = [0.0; K];
-    type Of<T: Copy + Send + Sync + fmt::Debug + PartialEq + Default + 'static> = [T; K];
+    type Of<T: Value> = [T; K];
 
     #[inline(always)]
     fn as_slice(&self) -> &[f64] {
@@ -49,17 +42,15 @@ impl<const K: usize> Outputs for [f64; K] {
     }
 
     #[inline(always)]
-    fn map<T: Copy + Send + Sync + fmt::Debug + PartialEq + Default + 'static>(
-        &self,
-        convert: impl Fn(f64) -> T,
-    ) -> [T; K] {
+    fn map<T: Value>(&self, convert: impl Fn(f64) -> T) -> [T; K] {
         std::array::from_fn(|k| convert(self[k]))
     }
 }
 
 /// A linear differential operator in D dimensions, as terms: what a method discretizes.
 ///
-/// Typed expressions ([`Beta`], [`Plus`], [`Times`], [`Laplacian`], [`Gradient`], [`Divergence`]) and the run-time
+/// Typed expressions ([`Beta`](crate::Beta), [`Plus`](crate::Plus), [`Times`](crate::Times),
+/// [`Laplacian`](crate::Laplacian), [`Gradient`](crate::Gradient), [`Along`](crate::Along)) and the run-time
 /// [`Expression`] implement it; below this line only terms exist, so both give identical bits.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is no differential operator in {D} dimensions",
@@ -103,205 +94,6 @@ pub(super) fn collect<const D: usize, Op: Operator<D>>(operator: &Op) -> Result<
     Ok(outputs)
 }
 
-/// A typed expression whose terms all have one degree, known to the compiler.
-pub trait Homogeneous {
-    /// |beta| of every term.
-    type Degree: Unsigned;
-}
-
-impl<L: Exponents> Homogeneous for Beta<L> {
-    type Degree = L::Degree;
-}
-
-impl<L: HasLen<D>, const D: usize> Operator<D> for Beta<L> {
-    type Out = [f64; 1];
-
-    fn terms(&self, term: &mut dyn FnMut(usize, MultiIndex<D>, f64)) {
-        term(0, Beta::<L>::index(), 1.0);
-    }
-}
-
-/// The sum of two operators of equal degree: one solve, one weight per pair.
-///
-/// ```
-/// use parops::{D2, Operator};
-/// let sum = D2::<2, 0>::default() + 3.0 * D2::<0, 2>::default();
-/// assert_eq!(sum.to_string(), "D^(2,0) + 3 D^(0,2)");
-/// ```
-#[derive(Clone, Copy, Default)]
-pub struct Plus<A: Homogeneous, B: Homogeneous>(A, B)
-where
-    A::Degree: SameDegree<B::Degree>;
-
-impl<A: Homogeneous, B: Homogeneous> Homogeneous for Plus<A, B>
-where
-    A::Degree: SameDegree<B::Degree>,
-{
-    type Degree = A::Degree;
-}
-
-impl<A, B, const D: usize> Operator<D> for Plus<A, B>
-where
-    A: Homogeneous + Operator<D>,
-    B: Homogeneous + Operator<D, Out = A::Out>,
-    A::Degree: SameDegree<B::Degree>,
-{
-    type Out = A::Out;
-
-    fn terms(&self, term: &mut dyn FnMut(usize, MultiIndex<D>, f64)) {
-        self.0.terms(term);
-        self.1.terms(term);
-    }
-}
-
-impl<A: Homogeneous + fmt::Display, B: Homogeneous + fmt::Display> fmt::Display for Plus<A, B>
-where
-    A::Degree: SameDegree<B::Degree>,
-{
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} + {}", self.0, self.1)
-    }
-}
-
-/// An operator times a constant factor.
-#[derive(Clone, Copy, Debug)]
-pub struct Times<A>(f64, A);
-
-impl<A: Homogeneous> Homogeneous for Times<A> {
-    type Degree = A::Degree;
-}
-
-impl<A: Operator<D>, const D: usize> Operator<D> for Times<A> {
-    type Out = A::Out;
-
-    fn terms(&self, term: &mut dyn FnMut(usize, MultiIndex<D>, f64)) {
-        self.1.terms(&mut |output, index, factor| term(output, index, self.0 * factor));
-    }
-}
-
-impl<A: fmt::Display> fmt::Display for Times<A> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {}", self.0, self.1)
-    }
-}
-
-/// The Laplacian sum_i d^2/dx_i^2, one weight per pair.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Laplacian<const D: usize>;
-
-impl<const D: usize> Homogeneous for Laplacian<D> {
-    type Degree = U2;
-}
-
-impl<const D: usize> Operator<D> for Laplacian<D> {
-    type Out = [f64; 1];
-
-    fn terms(&self, term: &mut dyn FnMut(usize, MultiIndex<D>, f64)) {
-        for axis in 0..D {
-            let mut exponents = [0; D];
-            exponents[axis] = 2;
-            term(0, MultiIndex::new(exponents), 1.0);
-        }
-    }
-}
-
-/// The gradient, output k being d/dx_k: D weights per pair.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Gradient<const D: usize>;
-
-impl<const D: usize> Homogeneous for Gradient<D> {
-    type Degree = U1;
-}
-
-impl<const D: usize> Operator<D> for Gradient<D> {
-    type Out = [f64; D];
-
-    fn terms(&self, term: &mut dyn FnMut(usize, MultiIndex<D>, f64)) {
-        for axis in 0..D {
-            let mut exponents = [0; D];
-            exponents[axis] = 1;
-            term(axis, MultiIndex::new(exponents), 1.0);
-        }
-    }
-}
-
-/// The divergence of a vector field. Its rows are those of the [`Gradient`]; `apply_dot` contracts them with the field.
-pub type Divergence<const D: usize> = Gradient<D>;
-
-/// v . grad for one constant velocity. Where the velocity varies, contract [`Gradient`] rows by `apply_along`.
-#[derive(Clone, Copy, Debug)]
-pub struct Along<const D: usize>(
-    /// The velocity v.
-    pub [f64; D],
-);
-
-impl<const D: usize> Homogeneous for Along<D> {
-    type Degree = U1;
-}
-
-impl<const D: usize> Operator<D> for Along<D> {
-    type Out = [f64; 1];
-
-    fn terms(&self, term: &mut dyn FnMut(usize, MultiIndex<D>, f64)) {
-        Gradient::<D>.terms(&mut |axis, index, factor| term(0, index, factor * self.0[axis]));
-    }
-}
-
-macro_rules! arithmetic {
-    ($([$($generics:tt)*] $ty:ty;)*) => { $(
-        impl<$($generics)*, Other: Homogeneous> Add<Other> for $ty
-        where
-            $ty: Homogeneous,
-            <$ty as Homogeneous>::Degree: SameDegree<Other::Degree>,
-        {
-            type Output = Plus<$ty, Other>;
-            fn add(self, other: Other) -> Self::Output {
-                Plus(self, other)
-            }
-        }
-
-        impl<$($generics)*> Mul<$ty> for f64
-        where
-            $ty: Homogeneous,
-        {
-            type Output = Times<$ty>;
-            fn mul(self, operator: $ty) -> Self::Output {
-                Times(self, operator)
-            }
-        }
-    )* };
-}
-
-arithmetic! {
-    [L: Exponents] Beta<L>;
-    [A: Homogeneous] Times<A>;
-    [const D: usize] Laplacian<D>;
-    [const D: usize] Along<D>;
-    [const D: usize] Gradient<D>;
-}
-
-impl<A: Homogeneous, B: Homogeneous, Other: Homogeneous> Add<Other> for Plus<A, B>
-where
-    A::Degree: SameDegree<B::Degree> + SameDegree<Other::Degree>,
-{
-    type Output = Plus<Self, Other>;
-
-    fn add(self, other: Other) -> Self::Output {
-        Plus(self, other)
-    }
-}
-
-impl<A: Homogeneous, B: Homogeneous> Mul<Plus<A, B>> for f64
-where
-    A::Degree: SameDegree<B::Degree>,
-{
-    type Output = Times<Plus<A, B>>;
-
-    fn mul(self, operator: Plus<A, B>) -> Self::Output {
-        Times(self, operator)
-    }
-}
-
 /// A scalar operator known at run time only: from a configuration file, from another language.
 ///
 /// ```
@@ -328,6 +120,23 @@ impl<const D: usize> Expression<D> {
         Ok(Self { terms, degree })
     }
 
+    /// A typed expression, or any other scalar operator, as run-time data.
+    ///
+    /// ```
+    /// use parops::{Expression, Laplacian};
+    /// let laplacian = Expression::of(&(2.0 * Laplacian::<2>))?;
+    /// assert_eq!(laplacian.to_string(), "2 D^(2,0) + 2 D^(0,2)");
+    /// # parops::Result::Ok(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), and [`MultiIndexError::Output`] where the operator names an output other than 0.
+    pub fn of(operator: &impl Operator<D, Out = [f64; 1]>) -> Result<Self> {
+        let terms = collect(operator)?.swap_remove(0);
+        let degree = common_degree(&terms)?;
+        Ok(Self { terms, degree })
+    }
+
     /// |beta| of every term.
     pub fn degree(&self) -> u32 {
         self.degree
@@ -346,24 +155,39 @@ impl<const D: usize> Operator<D> for Expression<D> {
 
 impl<const D: usize> fmt::Display for Expression<D> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, term) in self.terms.iter().enumerate() {
-            f.write_str(if i == 0 { "" } else { " + " })?;
-            if term.factor != 1.0 {
-                write!(f, "{} ", term.factor)?;
-            }
-            write!(f, "{}", term.index)?;
-        }
-        Ok(())
+        let mut sum = ShowSum::new(f);
+        self.terms.iter().try_for_each(|term| sum.term(term.factor, term.index))
     }
 }
 
-impl<A: Homogeneous, B: Homogeneous> fmt::Debug for Plus<A, B>
-where
-    A: fmt::Debug,
-    B: fmt::Debug,
-    A::Degree: SameDegree<B::Degree>,
-{
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:?} + {:?}", self.0, self.1)
+/// Writes the terms of a sum with the signs between them; see [`Homogeneous::show`](crate::Homogeneous::show).
+pub struct ShowSum<'a, 'f> {
+    f: &'a mut fmt::Formatter<'f>,
+    empty: bool,
+}
+
+impl<'a, 'f> ShowSum<'a, 'f> {
+    pub(super) fn new(f: &'a mut fmt::Formatter<'f>) -> Self {
+        Self { f, empty: true }
+    }
+
+    /// Writes one term: its sign, its factor unless that is 1, and what it is a factor of.
+    ///
+    /// # Errors
+    /// Where the formatter fails.
+    pub fn term(&mut self, factor: f64, derivative: impl fmt::Display) -> fmt::Result {
+        let negative = factor < 0.0;
+        self.f.write_str(match (self.empty, negative) {
+            (true, false) => "",
+            (true, true) => "-",
+            (false, false) => " + ",
+            (false, true) => " - ",
+        })?;
+        self.empty = false;
+        let size = if negative { -factor } else { factor };
+        if size != 1.0 {
+            write!(self.f, "{size} ")?;
+        }
+        write!(self.f, "{derivative}")
     }
 }

@@ -2,12 +2,16 @@
 
 mod expression;
 mod method;
+mod named;
 mod pairwise;
 mod pse;
 mod sph;
+mod typed;
 
-pub use expression::{Along, Divergence, Expression, Gradient, Homogeneous, Laplacian, Operator, Outputs, Plus, Times};
+pub use expression::{Expression, Operator, Outputs, ShowSum, Value};
 pub use method::{Allowance, Breach, Method, RowReport, spread};
+pub use named::{Along, Divergence, Gradient, Laplacian};
 pub use pairwise::{MOMENT_TOLERANCE, PairScratch};
 pub use pse::{Form, Pse, Sign};
 pub use sph::{Differentiated, Sph, SphForm};
+pub use typed::{Homogeneous, Plus, Times};
