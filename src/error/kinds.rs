@@ -448,6 +448,18 @@ kinds! {
             /// The coefficient.
             value: f64,
         } => "coefficient {value} must be finite and not negative",
+        /// A kernel that approximates no sum of second derivatives D^2_i.
+        NotDiffusion {
+            /// The degree of what it approximates.
+            degree: u32,
+        } => "a kernel of degree {degree} that approximates no sum of second derivatives along axes has no diffusion limit",
+        /// A kernel that is not even along an axis.
+        Uneven {
+            /// Axis.
+            axis: usize,
+            /// Largest difference at mirrored points, relative to the kernel.
+            defect: f64,
+        } => "the kernel is not even along axis {axis}: mirrored points differ by {defect:e} of it",
         /// States of different shape in one step.
         Shape {
             /// Length found.

@@ -3,19 +3,24 @@
 mod entry;
 mod euler;
 mod integrate;
+mod lattice;
 mod leapfrog;
 mod limit;
 mod plan;
 mod rk4;
 mod state;
 mod stepper;
+mod symbol;
+mod wide_gaussian;
 
 pub use entry::Entry;
 pub use euler::Euler;
 pub use integrate::{Run, integrate};
+pub use lattice::LatticeSpectrum;
 pub use leapfrog::Leapfrog;
 pub use limit::{Binding, Policy, StepLimit};
 pub use plan::Plan;
 pub use rk4::Rk4;
 pub use state::State;
 pub use stepper::{Rhs, Stepper};
+pub use wide_gaussian::wide_gaussian_decay;
