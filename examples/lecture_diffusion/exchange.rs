@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use parops::{
     Allowance, Apply, CellList, Domain, Epsilon, Euler, Exchange, Exponential, Face, Field, Kernel, Laplacian,
-    LatticeSpectrum, Method, Particles, Plan, Pse, Result, Rk4, Rows, StepLimit, Stepper, WideGaussian, integrate,
+    LatticeSpectrum, Method, Particles, Plan, Pse, Result, Rk4, Rows, Stepper, WideGaussian, integrate,
 };
 
 use crate::benchmark::{D, DT, Record, T, X_PSE, exact, norms};
@@ -63,8 +63,8 @@ where
     let start = Instant::now();
     let h = X_PSE / n as f64;
     let order = kernel.order();
-    let spectrum = LatticeSpectrum::of(&kernel, h / epsilon, kernel.support())?;
-    let limit = StepLimit::from_spectral_bound(spectrum.lambda_max() / (epsilon * epsilon), D)?;
+    let spectrum = LatticeSpectrum::scan(&kernel, h / epsilon, kernel.support())?;
+    let limit = spectrum.limit(D, epsilon)?;
 
     // Placement x_p = (p + 1/2) h, the odd image at x = 0, and an open end where u is below round-off: there, and
     // only there, the kernels may find too few neighbors.
