@@ -8,7 +8,9 @@ mod scalar;
 mod scale;
 mod stencil;
 pub use error::*;
-pub use kernel::{ExactPolynomial, Exchange, Kernel, Rational, SmoothingKernel};
+pub use kernel::{
+    ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Rational, SmoothingKernel, WideGaussian,
+};
 pub use multi_index::*;
 pub use neighbors::{Canonical, Neighbors};
 pub use operator::*;
