@@ -11,7 +11,9 @@ mod stencil;
 mod time;
 pub use apply::{Apply, Field, MatrixFree, Report, Row, Rows};
 pub use error::*;
-pub use kernel::{ExactPolynomial, Exchange, Kernel, Rational, SmoothingKernel};
+pub use kernel::{
+    ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Rational, SmoothingKernel, WideGaussian,
+};
 pub use multi_index::*;
 pub use neighbors::{Canonical, Neighbors};
 pub use operator::*;

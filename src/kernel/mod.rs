@@ -2,11 +2,15 @@
 
 mod derivation;
 mod exchange;
+mod gaussian;
 mod harmonic;
+mod high_order;
 mod polynomial;
 mod rational;
 
 pub use exchange::Exchange;
+pub use gaussian::{Gaussian, WideGaussian};
+pub use high_order::HighOrderGaussian;
 pub use polynomial::ExactPolynomial;
 pub use rational::Rational;
 

@@ -1,0 +1,152 @@
+//! Smoothing kernels of order above 2: the identity kernels, a polynomial times exp(-|z|^2).
+
+use super::exchange::{Exchange, horner};
+use super::{Kernel, SmoothingKernel};
+use crate::error::{KernelError, Result};
+use crate::multi_index::{MultiIndex, Term};
+use crate::scalar::{Scalar, square};
+
+/// The smoothing kernel W(z) = pi^(-D/2) P(|z|^2) exp(-|z|^2) of order r = 2, 4, 6 or 8: the identity kernel.
+///
+/// P has degree r/2 - 1 and is [`Exchange`] for beta = 0: 1 for r = 2, D/2 + 1 - |z|^2 for r = 4. All orders share one
+/// width, so that one epsilon serves them; it is narrower by sqrt(2) than [`Gaussian`](crate::Gaussian). From r = 4 on
+/// W is negative at a distance.
+///
+/// Derivatives are those of a function g of s = |z|^2,
+/// D^beta W = sum_(2k <= beta) prod_i (beta_i! / (k_i! (beta_i - 2k_i)!)) (2z)^(beta - 2k) g^(|beta| - |k|)(s), and
+/// allocate nothing. f32 overflows to infinity in high degrees, from about 40 on.
+///
+/// ```
+/// use parops::{HighOrderGaussian, Kernel, SmoothingKernel};
+/// let w = HighOrderGaussian::<2>::new(4)?;
+/// assert!((w.value(&[0.0, 0.0]) - 2.0 / std::f64::consts::PI).abs() < 1e-15);
+/// assert_eq!(w.gradient(&[0.0, 0.0])?, [0.0, 0.0]);
+/// # parops::Result::Ok(())
+/// ```
+///
+/// Source: notes 000, eq. 18 for beta = 0; notes 001, sec. 5.1 for what a smoothing kernel must satisfy.
+#[derive(Clone, Debug)]
+pub struct HighOrderGaussian<const D: usize> {
+    identity: Exchange<D>,
+    /// g(s) exp(s) = sum_k profile_k s^k and its first three derivatives; P has at most four coefficients.
+    profiles: [[f64; 4]; 4],
+}
+
+impl<const D: usize> HighOrderGaussian<D> {
+    /// The highest |beta| of a derivative: beyond it factorials leave the range of `f64`.
+    pub const DERIVATIVE_LIMIT: u32 = 255;
+
+    /// The kernel of order r = `order`.
+    ///
+    /// # Errors
+    /// [`KernelError::Order`] where r is not 2, 4, 6 or 8.
+    pub fn new(order: u32) -> Result<Self> {
+        let identity = Exchange::new(&[Term { index: MultiIndex::ZERO, factor: 1.0 }], order)?;
+        let mut profiles = [[0.0; 4]; 4];
+        for (profile, &coefficient) in profiles[0].iter_mut().zip(identity.radial().unwrap_or(&[])) {
+            *profile = coefficient;
+        }
+        for j in 1..4 {
+            profiles[j] = std::array::from_fn(|k| if k < 3 { profiles[j - 1][k + 1] * (k + 1) as f64 } else { 0.0 });
+        }
+        Ok(Self { identity, profiles })
+    }
+
+    /// The same kernel among the exchange kernels, with its exact polynomial and moments.
+    pub fn as_exchange(&self) -> &Exchange<D> {
+        &self.identity
+    }
+
+    /// exp(s) g^(m)(s) = (d/ds - 1)^m P = sum_j C(m,j) (-1)^(m-j) P^(j), from the values P^(j)(s).
+    #[inline]
+    fn differentiated<T: Scalar>(m: u32, jet: &[T; 4]) -> T {
+        let m = f64::from(m);
+        let binomials = [1.0, m, m * (m - 1.0) / 2.0, m * (m - 1.0) * (m - 2.0) / 6.0];
+        let sum =
+            jet[0] - jet[1] * T::lift(binomials[1]) + jet[2] * T::lift(binomials[2]) - jet[3] * T::lift(binomials[3]);
+        if m % 2.0 == 0.0 { sum } else { -sum }
+    }
+}
+
+impl<T: Scalar, const D: usize> Kernel<T, D> for HighOrderGaussian<D> {
+    #[inline]
+    fn value(&self, z: &[T; D]) -> T {
+        let s = square(z);
+        horner(&self.profiles[0], s) * (-s).exp()
+    }
+
+    fn terms(&self) -> &[Term<D>] {
+        Kernel::<T, D>::terms(&self.identity)
+    }
+
+    fn order(&self) -> u32 {
+        Kernel::<T, D>::order(&self.identity)
+    }
+
+    fn support(&self) -> f64 {
+        Kernel::<T, D>::support(&self.identity)
+    }
+
+    fn overlap_limit(&self) -> f64 {
+        Kernel::<T, D>::overlap_limit(&self.identity)
+    }
+
+    fn positive_definite(&self) -> bool {
+        true
+    }
+}
+
+impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for HighOrderGaussian<D> {
+    fn derivative(&self, beta: MultiIndex<D>, z: &[T; D]) -> Result<T> {
+        let degree = beta.degree();
+        if degree > Self::DERIVATIVE_LIMIT {
+            return Err(KernelError::Regularity { degree, limit: Self::DERIVATIVE_LIMIT }.into());
+        }
+        let s = square(z);
+        let jet = self.profiles.each_ref().map(|profile| horner(profile, s));
+        let exponents = beta.exponents();
+        let mut halves = [0_u8; D];
+        let mut sum = T::zero();
+        // Counts through all k with 2k <= beta.
+        loop {
+            let mut product = T::one();
+            for axis in 0..D {
+                product *= monomial(exponents[axis], halves[axis], z[axis]);
+            }
+            let taken: u32 = halves.iter().map(|&k| u32::from(k)).sum();
+            sum += product * Self::differentiated(degree - taken, &jet);
+            let Some(axis) = (0..D).find(|&axis| 2 * u32::from(halves[axis]) + 2 <= u32::from(exponents[axis])) else {
+                break;
+            };
+            halves[axis] += 1;
+            halves[..axis].fill(0);
+        }
+        Ok(sum * (-s).exp())
+    }
+
+    fn gradient(&self, z: &[T; D]) -> Result<[T; D]> {
+        let s = square(z);
+        let slope = (horner(&self.profiles[1], s) - horner(&self.profiles[0], s)) * T::lift(2.0) * (-s).exp();
+        Ok(z.map(|x| x * slope))
+    }
+
+    fn normalization(&self) -> f64 {
+        super::gaussian_constant::<D>(std::f64::consts::PI)
+    }
+}
+
+/// n! / (k! (n - 2k)!) (2x)^(n - 2k).
+#[inline]
+fn monomial<T: Scalar>(n: u8, k: u8, x: T) -> T {
+    let (n, k) = (u32::from(n), u32::from(k));
+    let mut factor = 1.0;
+    for i in 0..k {
+        // n! / (n - 2k)! has two factors for each one of k!.
+        factor *= f64::from((n - 2 * i) * (n - 2 * i - 1)) / f64::from(i + 1);
+    }
+    let mut product = T::lift(factor);
+    for _ in 0..n - 2 * k {
+        product *= x + x;
+    }
+    product
+}
