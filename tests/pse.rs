@@ -65,7 +65,7 @@ fn order_on_lattice<Op: parops::Operator<2, Out = [f64; 1]> + Clone>(
 #[test]
 fn pse_converges_with_its_design_order_on_lattices() {
     // The finest pair whose error is above the round-off of 1/epsilon^m.
-    for (order, n) in [(2, 64), (4, 48), (6, 32), (8, 32)] {
+    for (order, n) in [(2, 64), (4, 48), (6, 40), (8, 48)] {
         let laplacian = order_on_lattice(Laplacian::<2>, order, n, |x| -2.0 * TAU * TAU * wave(x));
         let mixed = order_on_lattice(D2::<1, 1>::default(), order, n, |x| {
             -TAU * TAU * (TAU * x[0]).cos() * (TAU * x[1]).sin()
@@ -90,7 +90,7 @@ fn wide_gaussian_has_the_leading_error_of_its_fourth_moment() {
     let particles = Particles::lattice([0.0], [1.0], [n]).unwrap();
     let epsilon = 1.0 / n as f64;
     let pse =
-        Pse::with_kernels([WideGaussian::<1>], Epsilon::global(epsilon).unwrap(), particles.volumes().unwrap()).unwrap();
+        Pse::with_kernels([WideGaussian::<1>::new()], Epsilon::global(epsilon).unwrap(), particles.volumes().unwrap()).unwrap();
     let domain = Domain::periodic([0.0], [1.0]).unwrap();
     let rows = pse.assemble(&CellList::build(&particles, &domain, pse.cutoff()).unwrap()).unwrap();
     let f: Vec<f64> = particles.points().iter().map(|x| (TAU * x[0]).sin()).collect();
@@ -142,9 +142,9 @@ fn scattered_set_is_refused_at_the_worst_particle_unless_allowed() -> Failure {
 
 #[test]
 fn overlap_limit_is_kept_for_narrow_and_wide_kernels() -> Failure {
-    let particles = lattice(16);
+    let particles = lattice(32);
     let domain = unit_torus();
-    let h = 1.0 / 16.0;
+    let h = 1.0 / 32.0;
     let refused = |order, ratio: f64| -> Option<ErrorKind> {
         let pse = Pse::new(Laplacian::<2>, order, Epsilon::global(h / ratio).unwrap(), particles.volumes().unwrap());
         let pse = pse.unwrap();
@@ -161,7 +161,7 @@ fn overlap_limit_is_kept_for_narrow_and_wide_kernels() -> Failure {
         }
     }
     for (ratio, legal) in [(1.0, true), (4.0 / 3.0, true), (1.35, false)] {
-        let pse = Pse::with_kernels([WideGaussian::<2>], Epsilon::global(h / ratio)?, particles.volumes()?)?;
+        let pse = Pse::with_kernels([WideGaussian::<2>::new()], Epsilon::global(h / ratio)?, particles.volumes()?)?;
         let neighbors = CellList::build(&particles, &domain, pse.cutoff())?;
         assert_eq!(pse.assemble(&neighbors).is_ok(), legal, "h/epsilon = {ratio}");
     }
@@ -205,7 +205,7 @@ fn value_form_conserves_with_volumes_and_strength_form_is_volume_times_value_for
     let volumes = Volumes::each((0..256).map(|_| (0.8 + 0.4 * random.uniform()) / 256.0).collect())?;
     let f: Vec<f64> = (0..256).map(|_| random.normal()).collect();
     let strengths: Vec<f64> = (0..256).map(|p| f[p] * volumes.get(p).unwrap()).collect();
-    let pse = Pse::new(Laplacian::<2>, 4, Epsilon::global(0.125)?, &volumes)?.allow(Allowance::Everywhere);
+    let pse = Pse::new(Laplacian::<2>, 4, Epsilon::global(0.08)?, &volumes)?.allow(Allowance::Everywhere);
     let neighbors = CellList::build(&particles, &unit_torus(), pse.cutoff())?;
     let (mut of_values, mut of_strengths) = (vec![0.0; 256], vec![0.0; 256]);
     let rows = pse.assemble(&neighbors)?;
@@ -291,8 +291,8 @@ fn gradient_divergence_and_velocity_contract_one_set_of_rows() -> Failure {
 
 #[test]
 fn typed_and_run_time_operators_give_identical_bits() -> Failure {
-    let particles = Particles::jittered([0.0; 2], [1.0; 2], [20; 2], 0.05, 1)?;
-    let epsilon = Epsilon::global(0.1)?;
+    let particles = Particles::jittered([0.0; 2], [1.0; 2], [30; 2], 0.01, 1)?;
+    let epsilon = Epsilon::global(0.08)?;
     let typed = Pse::new(D2::<2, 0>::default() + 3.0 * D2::<0, 2>::default(), 4, epsilon.clone(), particles.volumes()?)?;
     let terms = [(MultiIndex::new([2, 0]), 1.0), (MultiIndex::new([0, 2]), 3.0)];
     let at_run_time = Pse::new(Expression::new(terms)?, 4, epsilon, particles.volumes()?)?;
@@ -303,15 +303,15 @@ fn typed_and_run_time_operators_give_identical_bits() -> Failure {
 
 #[test]
 fn epsilon_per_particle_equals_global_epsilon_where_it_is_constant() -> Failure {
-    let particles = lattice(20);
-    let global = Pse::new(Laplacian::<2>, 2, Epsilon::global(0.1)?, particles.volumes()?)?;
-    let each = Pse::new(Laplacian::<2>, 2, Epsilon::each(vec![0.1; 400])?, particles.volumes()?)?;
+    let particles = lattice(24);
+    let global = Pse::new(Laplacian::<2>, 2, Epsilon::global(0.08)?, particles.volumes()?)?;
+    let each = Pse::new(Laplacian::<2>, 2, Epsilon::each(vec![0.08; 576])?, particles.volumes()?)?;
     let neighbors = CellList::build(&particles, &unit_torus(), global.cutoff())?;
     assert_eq!(global.assemble(&neighbors)?, each.assemble(&neighbors)?);
-    let varied: Vec<f64> = (0..400).map(|p| 0.1 - 1e-4 * (p % 7) as f64).collect();
+    let varied: Vec<f64> = (0..576).map(|p| 0.08 - 1e-4 * (p % 7) as f64).collect();
     let varied = Pse::new(Laplacian::<2>, 2, Epsilon::each(varied)?, particles.volumes()?)?;
     let rows = varied.assemble(&neighbors)?;
-    let mut out = vec![0.0; 400];
+    let mut out = vec![0.0; 576];
     rows.apply(&values(&particles, wave), &mut out)?;
     let exact = -2.0 * TAU * TAU * wave(&particles.points()[33]);
     assert!((out[33] - exact).abs() < 0.1 * 2.0 * TAU * TAU);
@@ -324,7 +324,7 @@ fn epsilon_per_particle_equals_global_epsilon_where_it_is_constant() -> Failure 
 
 #[test]
 fn provider_too_short_for_the_kernel_is_refused_with_the_cutoff_to_build_with() -> Failure {
-    let particles = lattice(20);
+    let particles = lattice(40);
     let pse = Pse::new(Laplacian::<2>, 2, Epsilon::global(0.05)?, particles.volumes()?)?;
     let short = CellList::build(&particles, &unit_torus(), Cutoff(0.29))?;
     let error = pse.assemble(&short).unwrap_err();
@@ -332,7 +332,7 @@ fn provider_too_short_for_the_kernel_is_refused_with_the_cutoff_to_build_with() 
     assert!(matches!(*error.kind(), ErrorKind::Neighbor(NeighborError::Reach { cutoff, reach })
         if cutoff == pse.cutoff().0 && reach == 0.29));
     // A shorter kernel is the caller's choice; at 3.5 epsilon it has lost 3e-3 of its second moment in 2D.
-    assert!(pse.support(5.8)?.assemble(&short).is_ok());
+    assert!(pse.support(5.7)?.assemble(&short).is_ok());
     Ok(())
 }
 
@@ -351,7 +351,7 @@ fn target_off_the_particles_has_no_difference() -> Failure {
 fn settings_and_lengths_are_checked() -> Failure {
     let particles = lattice(20);
     let volumes = particles.volumes()?;
-    let pse = || Pse::new(Laplacian::<2>, 2, Epsilon::global(0.1).unwrap(), volumes).unwrap();
+    let pse = || Pse::new(Laplacian::<2>, 2, Epsilon::global(0.08).unwrap(), volumes).unwrap();
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let setting = |error: parops::Error| {
             matches!(*error.kind(), ErrorKind::Operator(OperatorError::Setting { value }) if value.to_bits() == bad.to_bits())
@@ -363,15 +363,15 @@ fn settings_and_lengths_are_checked() -> Failure {
         *pse().sign(Sign::Plus).unwrap_err().kind(),
         ErrorKind::Operator(OperatorError::PlusEven { degree: 2 })
     ));
-    let identity = Pse::new(D2::<0, 0>::default(), 2, Epsilon::global(0.1)?, volumes).unwrap_err();
+    let identity = Pse::new(D2::<0, 0>::default(), 2, Epsilon::global(0.08)?, volumes).unwrap_err();
     assert!(matches!(*identity.kind(), ErrorKind::Operator(OperatorError::Degree { degree: 0, low: 1 })));
 
     // Volumes or epsilons for fewer particles than there are.
     let neighbors = CellList::build(&particles, &unit_torus(), pse().cutoff())?;
     let few = Volumes::each(vec![1.0 / 400.0; 399])?;
-    let error = Pse::new(Laplacian::<2>, 2, Epsilon::global(0.1)?, &few)?.assemble(&neighbors).unwrap_err();
+    let error = Pse::new(Laplacian::<2>, 2, Epsilon::global(0.08)?, &few)?.assemble(&neighbors).unwrap_err();
     assert!(matches!(*error.kind(), ErrorKind::Operator(OperatorError::Length { found: 399, index: 399 })));
-    let few = Epsilon::each(vec![0.1; 10])?;
+    let few = Epsilon::each(vec![0.08; 10])?;
     let error = Pse::new(Laplacian::<2>, 2, few, volumes)?.assemble(&neighbors).unwrap_err();
     assert!(matches!(*error.kind(), ErrorKind::Operator(OperatorError::Length { found: 10, index: 10 })));
     assert_eq!(error.particle(), Some(10));
@@ -379,20 +379,20 @@ fn settings_and_lengths_are_checked() -> Failure {
 }
 
 #[test]
-fn weight_overflow_is_refused_and_small_scales_are_not() -> Failure {
-    // epsilon^-m leaves f64 at epsilon = 1e-160 for m = 2, and only there.
-    for (h, legal) in [(1e-120, true), (1e-165, false)] {
-        let points = (0..40).map(|p| [f64::from(p) * h]).collect();
-        let particles = Particles::new(points)?.with_volumes(Volumes::equal(h)?)?;
-        let laplacian = Laplacian::<1>;
-        let pse = Pse::new(laplacian, 2, Epsilon::global(2.0 * h)?, particles.volumes()?)?.allow(Allowance::Everywhere);
-        let Ok(neighbors) = BruteForce::build(&particles, &Domain::open(), pse.cutoff()) else {
-            assert!(!legal);
-            continue;
-        };
-        let built = pse.assemble(&neighbors);
-        assert_eq!(built.is_ok(), legal, "{:?}", built.err());
-    }
+fn weight_overflow_is_refused_at_the_particle_and_small_scales_are_not() -> Failure {
+    // epsilon^-m leaves f64 at epsilon = 2e-45 for m = 8 (1e357), and not for m = 2.
+    let h = 1e-45;
+    let points = (0..40).map(|p| [f64::from(p) * h]).collect();
+    let particles = Particles::new(points)?.with_volumes(Volumes::equal(h)?)?;
+    let build = |beta: u8| {
+        let operator = Expression::new([(MultiIndex::new([beta]), 1.0)])?;
+        let pse = Pse::new(operator, 2, Epsilon::global(2.0 * h)?, particles.volumes()?)?.allow(Allowance::Everywhere);
+        pse.assemble(&BruteForce::build(&particles, &Domain::open(), pse.cutoff())?)
+    };
+    assert!(build(2).is_ok());
+    let error = build(8).unwrap_err();
+    assert_eq!(error.particle(), Some(0));
+    assert!(matches!(*error.kind(), ErrorKind::Operator(OperatorError::Weight { weight, .. }) if !weight.is_finite()));
     Ok(())
 }
 
@@ -451,24 +451,23 @@ fn spectral_bound_is_the_one_of_errata_26_for_a_positive_definite_kernel() -> Fa
     // S_p = sum_q V_q eta_eps, q = p included, is 1 to spectral accuracy on a lattice: bound 1/eps^2.
     let particles = lattice(24);
     let epsilon = 1.0 / 24.0;
-    let pse = Pse::with_kernels([WideGaussian::<2>], Epsilon::global(epsilon)?, particles.volumes()?)?;
+    let pse = Pse::with_kernels([WideGaussian::<2>::new()], Epsilon::global(epsilon)?, particles.volumes()?)?;
     let rows = pse.assemble(&CellList::build(&particles, &unit_torus(), pse.cutoff())?)?;
     // The lattice sum of the wide Gaussian differs from 1 by 4 exp(-pi^2 * 4) per axis; the cutoff of 8 loses 1e-7.
     assert!((rows.report().spectral_bound * epsilon * epsilon - 1.0).abs() < 1e-6);
     let narrow = Pse::new(Laplacian::<2>, 4, Epsilon::global(2.0 / 24.0)?, particles.volumes()?)?;
     let rows = narrow.assemble(&CellList::build(&particles, &unit_torus(), narrow.cutoff())?)?;
-    assert_eq!(rows.report().spectral_bound, rows.report().worst.unwrap().spectral_bound);
     let two_sums = 2.0 * rows.report().sum_abs;
-    assert!((rows.report().spectral_bound / two_sums - 1.0).abs() <= round_off(rows.report().most));
+    let ratio = rows.report().spectral_bound / two_sums;
+    assert!((ratio - 1.0).abs() <= round_off(rows.report().most), "{ratio}");
     Ok(())
 }
 
 #[test]
 fn empty_set_has_no_rows() -> Failure {
     let particles = Particles::<2>::new(Vec::new())?;
-    let pse = Pse::new(Laplacian::<2>, 2, Epsilon::global(0.1)?, &Volumes::equal(1.0)?)?;
-    let rows = pse.assemble(&CellList::build(&particles, &unit_torus(), Cutoff(0.45))?);
-    let rows = rows.or_else(|_| pse.clone().support(4.5)?.assemble(&CellList::build(&particles, &unit_torus(), Cutoff(0.45))?))?;
+    let pse = Pse::new(Laplacian::<2>, 2, Epsilon::global(0.08)?, &Volumes::equal(1.0)?)?;
+    let rows = pse.assemble(&CellList::build(&particles, &unit_torus(), pse.cutoff())?)?;
     let mut out: Vec<f64> = Vec::new();
     rows.apply(&[], &mut out)?;
     assert_eq!((rows.report().rows, rows.report().worst), (0, None));

@@ -42,7 +42,7 @@ where
 {
     let h = X_PSE / n as f64;
     if order == 2 {
-        solve::<S, _>(scalar, WideGaussian::<1>, h, propagator, n)
+        solve::<S, _>(scalar, WideGaussian::<1>::new(), h, propagator, n)
     } else {
         let mut terms = Vec::new();
         parops::Operator::<1>::terms(&Laplacian::<1>, &mut |_, index, factor| terms.push(parops::Term { index, factor }));

@@ -98,7 +98,7 @@ pub enum SphForm {
 /// use parops::{Apply, CellList, D1, Domain, Gaussian, Particles, Spacing, Sph};
 /// let particles = Particles::lattice([0.0], [1.0], [50])?;
 /// let field: Vec<f64> = particles.points().iter().map(|x| (6.0 * x[0]).sin()).collect();
-/// let sph = Sph::new(D1::<0>::default(), Gaussian::<1>, Spacing(0.02).epsilon(1.5)?, particles.volumes()?)?;
+/// let sph = Sph::new(D1::<0>::default(), Gaussian::<1>::new(), Spacing(0.02).epsilon(1.5)?, particles.volumes()?)?;
 /// let between = CellList::build_at(&[[0.503]], &particles, &Domain::open(), sph.cutoff())?;
 /// let mut value = [0.0];
 /// sph.assemble(&between)?.apply(&field, &mut value)?;
