@@ -137,7 +137,8 @@ where
 }
 
 fn legend(x: i32, y: i32, mark: Mark, color: RGBColor) -> DynElement<'static, SVGBackend<'static>, (i32, i32)> {
-    let line = PathElement::new(vec![(x, y), (x + 22, y)], color.stroke_width(if mark == Mark::Dashed { 1 } else { 2 }));
+    let line =
+        PathElement::new(vec![(x, y), (x + 22, y)], color.stroke_width(if mark == Mark::Dashed { 1 } else { 2 }));
     match mark {
         Mark::CirclesAlone => Circle::new((x + 11, y), 4, color.filled()).into_dyn(),
         Mark::Circles => (EmptyElement::at((x, y))

@@ -76,7 +76,17 @@ impl Record {
         let observed = self.observed_order.map_or("-".to_string(), |order| format!("{order:.2}"));
         format!(
             "{:<4}{:<4}{:>3} {:<6}{:>6}{:>10.3e}{:>9.4}{:>6}{:>12.3e}{:>12.3e}{observed:>8}{:>11.6}",
-            self.method, self.scalar, self.order, self.stepper, self.n, self.h, self.dt, self.steps, self.l2, self.linf, self.seconds
+            self.method,
+            self.scalar,
+            self.order,
+            self.stepper,
+            self.n,
+            self.h,
+            self.dt,
+            self.steps,
+            self.l2,
+            self.linf,
+            self.seconds
         )
     }
 
@@ -85,7 +95,6 @@ impl Record {
 
     /// Whether this run differs from another in the number of particles only.
     pub fn same_series(&self, other: &Self) -> bool {
-        (self.method, self.scalar, self.order, self.stepper)
-            == (other.method, other.scalar, other.order, other.stepper)
+        (self.method, self.scalar, self.order, self.stepper) == (other.method, other.scalar, other.order, other.stepper)
     }
 }

@@ -45,8 +45,7 @@ pub fn check(records: &[Record]) -> Vec<Claim> {
     claim((slope + 0.5).abs() <= 0.15, format!("random walk converges like N^-1/2: fitted slope {slope:.3}"));
 
     for stepper in ["euler", "rk4"] {
-        let single: Vec<&Record> =
-            series("pse", "f32", 2, stepper).into_iter().filter(|r| r.n >= 400).collect();
+        let single: Vec<&Record> = series("pse", "f32", 2, stepper).into_iter().filter(|r| r.n >= 400).collect();
         let errors: Vec<f64> = single.iter().map(|r| r.l2).collect();
         claim(
             !errors.is_empty() && errors.iter().all(|l2| (1e-7..=2e-6).contains(l2)),
@@ -57,7 +56,9 @@ pub fn check(records: &[Record]) -> Vec<Claim> {
             let following = (last.n as f64 / first.n as f64).powi(2);
             claim(
                 ratio < following / 4.0,
-                format!("and does not follow order 2: it falls {ratio:.2} times where order 2 falls {following:.0} times"),
+                format!(
+                    "and does not follow order 2: it falls {ratio:.2} times where order 2 falls {following:.0} times"
+                ),
             );
         }
     }
@@ -75,9 +76,8 @@ fn slope(runs: &[&Record]) -> f64 {
     let points: Vec<(f64, f64)> = runs.iter().map(|r| ((r.n as f64).ln(), r.l2.ln())).collect();
     let count = points.len() as f64;
     let (mx, my) = points.iter().fold((0.0, 0.0), |(mx, my), (x, y)| (mx + x / count, my + y / count));
-    let (xy, xx) = points
-        .iter()
-        .fold((0.0, 0.0), |(xy, xx), (x, y)| (xy + (x - mx) * (y - my), xx + (x - mx) * (x - mx)));
+    let (xy, xx) =
+        points.iter().fold((0.0, 0.0), |(xy, xx), (x, y)| (xy + (x - mx) * (y - my), xx + (x - mx) * (x - mx)));
     xy / xx
 }
 

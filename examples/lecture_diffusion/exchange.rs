@@ -45,7 +45,9 @@ where
         solve::<S, _>(scalar, WideGaussian::<1>::new(), h, propagator, n)
     } else {
         let mut terms = Vec::new();
-        parops::Operator::<1>::terms(&Laplacian::<1>, &mut |_, index, factor| terms.push(parops::Term { index, factor }));
+        parops::Operator::<1>::terms(&Laplacian::<1>, &mut |_, index, factor| {
+            terms.push(parops::Term { index, factor })
+        });
         solve::<S, _>(scalar, Exchange::<1>::new(&terms, order)?, 2.0 * h, propagator, n)
     }
 }

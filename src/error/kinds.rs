@@ -219,6 +219,18 @@ kinds! {
             /// The other particle.
             other: usize,
         } => "lies on particle {other}",
+        /// A displacement from the lattice that leaves the cell.
+        Jitter {
+            /// The displacement in units of the spacing.
+            amount: f64,
+            /// Largest legal value.
+            high: f64,
+        } => "jitter {amount} is outside 0 to {high} spacings",
+        /// Memory that the system does not give.
+        Memory {
+            /// Number of entries asked for.
+            count: usize,
+        } => "there is no memory for {count} entries",
     }
 }
 
@@ -230,6 +242,20 @@ kinds! {
             /// The cutoff.
             cutoff: f64,
         } => "cutoff {cutoff} is not positive and finite",
+        /// A cutoff whose square leaves the range of the arithmetic.
+        CutoffRange {
+            /// The cutoff.
+            cutoff: f64,
+            /// Smallest legal value.
+            low: f64,
+            /// Largest legal value.
+            high: f64,
+        } => "cutoff {cutoff:e} is outside {low:e} to {high:e}",
+        /// A target without neighbors, where their mean distance is needed.
+        Isolated {
+            /// The cutoff.
+            cutoff: f64,
+        } => "no neighbor lies within the cutoff {cutoff}",
         /// A query beyond what the provider was built for.
         Reach {
             /// The cutoff asked for.

@@ -1,5 +1,16 @@
 //! Neighbor providers: who lies within the cutoff of whom.
 
+mod brute_force;
+mod canonical;
+mod cell_list;
+mod grid;
+mod placed;
+mod table;
+
+pub use brute_force::BruteForce;
+pub use canonical::Canonical;
+pub use cell_list::CellList;
+
 use crate::stencil::{Neighbor, Stencil};
 
 /// Answers, for every target p, which source particles (or images of them) lie within a cutoff.
@@ -70,6 +81,3 @@ pub trait Neighbors<const D: usize>: Sync {
         Canonical(self)
     }
 }
-
-mod canonical;
-pub use canonical::Canonical;

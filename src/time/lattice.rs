@@ -223,4 +223,3 @@ fn folded(theta: f64) -> f64 {
     let turn = std::f64::consts::TAU;
     (theta - turn * (theta / turn).round()).abs()
 }
-
