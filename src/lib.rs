@@ -1,8 +1,41 @@
-//! lib
+//! Discretized differential operators on particles: SPH and PSE, with their moment conditions checked per row.
+//!
+//! One equation holds the crate together,
+//!
+//! ```text
+//! D^beta f(x_p)  ~  epsilon^-|beta|  sum_q w_pq (f_q -/+ f_p)
+//! ```
+//!
+//! and every module is one factor of it: [`MultiIndex`] and [`Beta`] name D^beta, kernels ([`Exchange`], [`Gaussian`])
+//! give w, [`CellList`] and its kin give the q, [`Pse`] and [`Sph`] turn a stencil into weights, [`Rows`] and
+//! [`MatrixFree`] apply them to fields, and [`integrate`] advances u' = D u within a [`StepLimit`] known beforehand.
+//!
+//! ```
+//! use parops::{Apply, CellList, Domain, Laplacian, Particles, Pse, Result};
+//! # fn main() -> Result<()> {
+//! let particles = Particles::lattice([0.0, 0.0], [1.0, 1.0], [64, 64])?;
+//! let laplacian = Pse::new(Laplacian::<2>, 4, particles.spacing()?.epsilon(2.0)?, particles.volumes()?)?;
+//! let torus = Domain::periodic([0.0, 0.0], [1.0, 1.0])?;
+//! let rows = laplacian.assemble(&CellList::build(&particles, &torus, laplacian.cutoff())?)?;
+//!
+//! let wave = |x: &[f64; 2]| (std::f64::consts::TAU * x[0]).sin();
+//! let u: Vec<f64> = particles.points().iter().map(wave).collect();
+//! let mut lap_u = vec![0.0; u.len()];
+//! rows.apply(&u, &mut lap_u)?;
+//! assert!((lap_u[7] / u[7] / -39.478417604 - 1.0).abs() < 1e-3);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Features
+//! `rayon`: rows are built and applied by several threads, with the same bits for any number of them.
+//! `testing`: conformance checkers for kernels, providers, methods and steppers, ours and the user's own.
+
 mod apply;
 mod domain;
 mod error;
 mod kernel;
+mod moment;
 mod multi_index;
 mod neighbors;
 mod operator;
@@ -11,11 +44,16 @@ mod scalar;
 mod scale;
 mod stencil;
 mod time;
+
 pub use apply::{Apply, Field, MatrixFree, Report, Row, Rows};
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
 pub use error::*;
 pub use kernel::{
     ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Rational, SmoothingKernel, WideGaussian,
+};
+pub use moment::{
+    CenterTerm, Quadrature, continuous_moment, continuous_moments, discrete_moment, discrete_moments,
+    moment_conditions, required_moment,
 };
 pub use multi_index::*;
 pub use neighbors::{BruteForce, Canonical, CellList, Neighbors};
@@ -25,3 +63,6 @@ pub use scalar::Scalar;
 pub use scale::{Cutoff, Epsilon, Spacing, Volumes};
 pub use stencil::{Neighbor, Stencil};
 pub use time::*;
+
+#[cfg(feature = "testing")]
+pub mod testing;

@@ -86,6 +86,13 @@ kinds! {
             /// Highest degree the kernel is differentiable to.
             limit: u32,
         } => "the kernel has derivatives to degree {limit}, not {degree}",
+        /// A support radius or overlap limit that is not positive and finite.
+        Radii {
+            /// Support, in units of epsilon.
+            support: f64,
+            /// Largest h / epsilon.
+            overlap_limit: f64,
+        } => "support {support} and overlap limit {overlap_limit} must be positive and finite",
     }
 }
 

@@ -1,0 +1,10 @@
+//! Conformance checkers, for what this crate provides and for what its users plug in.
+//!
+//! Each returns the first promise that is broken, with the numbers.
+
+mod kernel;
+mod sample;
+mod smoothing;
+
+pub use kernel::{KernelFault, KernelLimits, check_kernel};
+pub use smoothing::check_smoothing_kernel;
