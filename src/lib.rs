@@ -8,6 +8,8 @@ mod operator;
 mod scalar;
 mod scale;
 mod stencil;
+#[cfg(feature = "testing")]
+pub mod testing;
 mod time;
 pub use apply::{Apply, Field, MatrixFree, Report, Row, Rows};
 pub use error::*;
