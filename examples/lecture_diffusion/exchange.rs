@@ -89,7 +89,7 @@ where
             let mut wide: Vec<f64> = u.iter().map(|u| u.as_()).collect();
             let double = Rows::<_, f64>::assemble(&pse, &neighbors)?;
             let exponential = Exponential::new(n, |f, out| double.apply(f, out))?;
-            exponential.advance(&mut wide, D * T)?;
+            exponential.propagate(D * T, &mut wide)?;
             u = wide.into_iter().map(S::lift).collect();
             (T, 1)
         }

@@ -5,6 +5,8 @@
 mod kernel;
 mod sample;
 mod smoothing;
+mod stepper;
 
 pub use kernel::{KernelFault, KernelLimits, check_kernel};
 pub use smoothing::check_smoothing_kernel;
+pub use stepper::{StepperFault, StepperReport, check_stepper};

@@ -143,6 +143,7 @@ fn fold<const D: usize>(
 ) -> Result<(Symbol<D>, [f64; D])> {
     let cell = delta.powi(D as i32);
     let (mut weights, mut coefficient) = (vec![0.0; per_axis.pow(D as u32)], [0.0; D]);
+    let mut values = vec![0.0; 1 << D];
     let (mut defect, mut largest) = ([0.0_f64; D], 0.0_f64);
     for (index, weight) in weights.iter_mut().enumerate().skip(1) {
         let mut rest = index;
@@ -154,7 +155,6 @@ fn fold<const D: usize>(
         if z.iter().map(|x| x * x).sum::<f64>() > radius * radius * (1.0 + SHELL) {
             continue;
         }
-        let eta = kernel.value(&z);
         for mirror in 0..1_usize << D {
             if (0..D).any(|i| mirror >> i & 1 == 1 && z[i] == 0.0) {
                 continue;
@@ -165,12 +165,14 @@ fn fold<const D: usize>(
                 return Err(OperatorError::Weight { q: index, weight: value }.into());
             }
             *weight += cell * value;
+            largest = largest.max(value.abs());
+            values[mirror] = value;
+            // Each image is compared with its own mirror image along one axis.
             let axis = mirror.trailing_zeros() as usize;
             if let Some(defect) = defect.get_mut(axis) {
-                *defect = defect.max((value - eta).abs());
+                *defect = defect.max((value - values[mirror & (mirror - 1)]).abs());
             }
         }
-        largest = largest.max(eta.abs());
         for (sum, x) in coefficient.iter_mut().zip(&z) {
             *sum += *weight * x * x / 2.0;
         }

@@ -2,6 +2,7 @@
 
 mod entry;
 mod euler;
+mod exponential;
 mod integrate;
 mod lattice;
 mod leapfrog;
@@ -15,6 +16,7 @@ mod wide_gaussian;
 
 pub use entry::Entry;
 pub use euler::Euler;
+pub use exponential::Exponential;
 pub use integrate::{Run, integrate};
 pub use lattice::LatticeSpectrum;
 pub use leapfrog::Leapfrog;
