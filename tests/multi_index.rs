@@ -51,9 +51,10 @@ fn typed_and_run_time_forms_agree_in_one_to_six_dimensions() {
 
 #[test]
 fn aliases_are_the_general_form() {
-    let one: Beta<tarr![U3]> = D1::<3>::default();
-    let two: Beta<tarr![U2, U1]> = D2::<2, 1>::default();
-    let three: Beta<tarr![U1, U0, U2]> = D3::<1, 0, 2>::default();
+    type One = Beta<tarr![U3]>;
+    type Two = Beta<tarr![U2, U1]>;
+    type Three = Beta<tarr![U1, U0, U2]>;
+    let (one, two, three): (One, Two, Three) = (D1::<3>::default(), D2::<2, 1>::default(), D3::<1, 0, 2>::default());
     assert_eq!(format!("{one} {two} {three}"), "D^(3) D^(2,1) D^(1,0,2)");
     assert_eq!(std::mem::size_of_val(&three), 0);
 }
@@ -83,7 +84,7 @@ fn prime_exponents(exponents: &[u8]) -> Vec<(u32, u32)> {
         .map(|prime| {
             let of_factor = |mut factor: u32| {
                 let mut times = 0;
-                while factor % prime == 0 {
+                while factor.is_multiple_of(prime) {
                     (factor, times) = (factor / prime, times + 1);
                 }
                 times
@@ -180,9 +181,9 @@ fn condition_count_has_the_values_of_the_literature() {
 }
 
 fn count_equals_enumeration<const D: usize>() {
-    for degree in 0..=4 {
+    for degree in 0..=4_u32 {
         for order in 1..=5 {
-            let alpha_min = u32::from(degree % 2 == 0);
+            let alpha_min = u32::from(degree.is_multiple_of(2));
             let listed = graded::<D>(alpha_min, degree + order - 1).count();
             assert_eq!(condition_count(D as u32, degree, order).unwrap(), listed as u128);
         }
@@ -239,7 +240,7 @@ proptest! {
         let degree: u32 = exponents.iter().map(|&e| u32::from(e)).sum();
         prop_assert_eq!(beta.exponents(), exponents);
         prop_assert_eq!(beta.degree(), degree);
-        prop_assert_eq!(beta.is_even(), degree % 2 == 0);
+        prop_assert_eq!(beta.is_even(), degree & 1 == 0);
         prop_assert_eq!(beta.sign(), (-1_i32).pow(degree));
     }
 
