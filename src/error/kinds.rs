@@ -49,6 +49,15 @@ kinds! {
             /// Largest legal order.
             high: u32,
         } => "order {order} is outside {low} to {high}",
+        /// More moment conditions than can be counted.
+        Count {
+            /// Number of dimensions.
+            dim: u32,
+            /// Degree |beta|.
+            degree: u32,
+            /// Order r.
+            order: u32,
+        } => "the moment conditions of degree {degree} and order {order} in {dim} dimensions do not fit 128 bits",
         /// An expression without terms, or an output without terms.
         Empty {
             /// The output that has no term.

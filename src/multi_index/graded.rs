@@ -54,19 +54,21 @@ fn successor<const D: usize>(alpha: MultiIndex<D>) -> Option<MultiIndex<D>> {
 /// ```
 ///
 /// # Errors
-/// [`MultiIndexError::Order`] for r = 0; [`MultiIndexError::Degree`] where l does not fit 128 bits.
+/// [`MultiIndexError::Order`] for r = 0; [`MultiIndexError::Count`] where l n, n = dim + |beta| + r - 1, does not fit
+/// 128 bits.
 ///
 /// Source: notes 001, eq. 5.39, with errata 20 and 21.
 pub fn condition_count(dim: u32, degree: u32, order: u32) -> Result<u128> {
     if order == 0 {
         return Err(MultiIndexError::Order { order, low: 1, high: u32::MAX }.into());
     }
-    let too_high = || MultiIndexError::Degree { degree, limit: u32::from(u8::MAX) };
-    // C(n, k) stays an integer at each step: C(n, i) = C(n, i - 1) (n - i + 1) / i.
-    let n = u128::from(dim) + u128::from(degree) + u128::from(order) - 1;
+    let too_many = || MultiIndexError::Count { dim, degree, order };
+    // C(n, k) = C(n, n - k) stays an integer at each step: C(n, i) = C(n, i - 1) (n - i + 1) / i.
+    let k = u128::from(dim);
+    let n = k + u128::from(degree) + u128::from(order) - 1;
     let mut count = 1_u128;
-    for i in 1..=u128::from(dim) {
-        count = count.checked_mul(n - i + 1).ok_or_else(too_high)? / i;
+    for i in 1..=k.min(n - k) {
+        count = count.checked_mul(n - i + 1).ok_or_else(too_many)? / i;
     }
     Ok(count - u128::from(degree.is_multiple_of(2)))
 }

@@ -1,0 +1,68 @@
+//! Errors carry a kind, the particle concerned and the numbers; their text shows all three.
+
+use parops::{
+    ApplyError, DomainError, Epsilon, Error, ErrorKind, KernelError, MultiIndexError, NeighborError, OperatorError,
+    ParticleError, Result, TimeError, Volumes,
+};
+
+/// One kind of every layer, with numbers that its sentence must show.
+fn one_of_each() -> Vec<(ErrorKind, &'static [&'static str])> {
+    vec![
+        (MultiIndexError::UnequalDegree { first: 2, other: 7 }.into(), &["2", "7"]),
+        (MultiIndexError::Count { dim: 31, degree: 41, order: 59 }.into(), &["31", "41", "59"]),
+        (KernelError::Regularity { degree: 4, limit: 3 }.into(), &["4", "3"]),
+        (DomainError::Faces { axis: 1, lower: 0.75, upper: -0.25 }.into(), &["axis 1", "0.75", "-0.25"]),
+        (ParticleError::Coordinate { axis: 2, coordinate: f64::NAN }.into(), &["axis 2", "NaN"]),
+        (NeighborError::Reach { cutoff: 0.5, reach: 0.375 }.into(), &["0.5", "0.375"]),
+        (OperatorError::Overlap { h_over_epsilon: 1.25, limit: 0.9 }.into(), &["1.25", "0.9"]),
+        (ApplyError::Input { found: 12, needed: 34 }.into(), &["12", "34"]),
+        (TimeError::Limit { dt: 0.125, limit: 0.0625 }.into(), &["0.125", "0.0625"]),
+        (ErrorKind::User { code: -17 }, &["-17"]),
+    ]
+}
+
+#[test]
+fn text_shows_the_numbers_and_the_particle_if_there_is_one() {
+    for (kind, numbers) in one_of_each() {
+        let error = Error::new(kind.clone());
+        let text = error.to_string();
+        for number in numbers {
+            assert!(text.contains(number), "{text:?} lacks {number}");
+        }
+        assert_eq!(error.particle(), None);
+        let placed = error.at(4711);
+        assert_eq!((placed.particle(), placed.to_string()), (Some(4711), format!("particle 4711: {text}")));
+        // Compared as text: a kind that holds NaN differs from itself.
+        assert_eq!(format!("{:?}", placed.kind()), format!("{kind:?}"));
+    }
+}
+
+#[test]
+fn user_code_comes_back_unchanged() {
+    for code in [0, i64::MIN, i64::MAX] {
+        assert_eq!(*Error::user(code).kind(), ErrorKind::User { code });
+    }
+}
+
+#[test]
+fn error_crosses_threads_and_boxes() {
+    fn refuse() -> std::result::Result<(), Box<dyn std::error::Error + Send + Sync>> {
+        Epsilon::global(0.0)?;
+        Ok(())
+    }
+    let text = std::thread::spawn(|| refuse().unwrap_err().to_string()).join().unwrap();
+    assert_eq!(text, "epsilon 0 is not positive and finite");
+}
+
+#[test]
+fn first_bad_entry_of_an_array_is_named() {
+    let bad: [fn(Vec<f64>) -> Result<()>; 2] = [|v| Epsilon::each(v).map(drop), |v| Volumes::each(v).map(drop)];
+    for refuse in bad {
+        for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let error = refuse(vec![1.0, 2.0, value, -3.0]).unwrap_err();
+            assert_eq!(error.particle(), Some(2), "{error}");
+            assert!(error.to_string().contains(&value.to_string()), "{error}");
+        }
+        assert_eq!(refuse(vec![f64::MIN_POSITIVE, f64::MAX]), Ok(()));
+    }
+}
