@@ -103,34 +103,54 @@ impl<const D: usize> CellList<D> {
     }
 
     /// Calls `found(source, separation, image)` for every neighbor of p.
+    ///
+    /// Candidates are first filtered without a branch into a small buffer, because whether a candidate is within the
+    /// cutoff cannot be predicted; what remains is measured exactly.
     #[inline(always)]
     fn scan(&self, p: usize, cutoff: f64, mut found: impl FnMut(u32, [f64; D], Image)) {
         let (Some(target), Some(limit)) = (self.placed.targets().get(p), self.placed.limit(cutoff)) else {
             return;
         };
-        let center = self.centers.get(p).map_or(usize::MAX, |&slot| slot as usize);
+        let center = self.centers.get(p).copied().unwrap_or(u32::MAX);
         let radius = cutoff.min(self.placed.cutoff);
         let rough = within(radius + self.grid.slack);
+        let mut measure = |slots: &[u32]| {
+            for &slot in slots {
+                let Origin { source, image } = self.origins[slot as usize];
+                let separation = if image == Image::OWN {
+                    difference(target, &self.positions[slot as usize])
+                } else {
+                    self.placed.separation(image, target, source as usize)
+                };
+                if slot != center && distance_squared(&separation) <= limit {
+                    found(source, separation, image);
+                }
+            }
+        };
+        let (mut buffer, mut held) = ([0_u32; BUFFER], 0);
         self.table.runs(&self.grid, target, radius, |run| {
-            let first = run.start;
-            for (offset, (position, origin)) in self.positions[run.clone()].iter().zip(&self.origins[run]).enumerate() {
-                let separation: [f64; D] = std::array::from_fn(|axis| target[axis] - position[axis]);
-                let squared = distance_squared(&separation);
-                if squared <= rough && first + offset != center {
-                    if origin.image == Image::OWN {
-                        if squared <= limit {
-                            found(origin.source, separation, Image::OWN);
-                        }
-                    } else {
-                        let exact = self.placed.separation(origin.image, target, origin.source as usize);
-                        if distance_squared(&exact) <= limit {
-                            found(origin.source, exact, origin.image);
-                        }
-                    }
+            for first in run.clone().step_by(BUFFER / 2) {
+                if held > BUFFER / 2 {
+                    measure(&buffer[..held]);
+                    held = 0;
+                }
+                let past = run.end.min(first + BUFFER / 2);
+                for (slot, position) in (first as u32..).zip(&self.positions[first..past]) {
+                    buffer[held % BUFFER] = slot;
+                    held += usize::from(distance_squared(&difference(target, position)) <= rough);
                 }
             }
         });
+        measure(&buffer[..held]);
     }
+}
+
+/// Candidates held before they are measured; a power of two, so that an index is masked, not checked.
+const BUFFER: usize = 128;
+
+#[inline(always)]
+fn difference<const D: usize>(target: &[f64; D], source: &[f64; D]) -> [f64; D] {
+    std::array::from_fn(|axis| target[axis] - source[axis])
 }
 
 /// A bound on every coordinate that enters: targets, sources, faces.
