@@ -58,7 +58,10 @@ pub use moment::{
     moment_conditions, required_moment,
 };
 pub use multi_index::*;
-pub use neighbors::{BruteForce, Canonical, CellList, Neighbors};
+pub use neighbors::{
+    BruteForce, Canonical, CellList, NeighborList, Neighbors, epsilon_from_neighbors, mean_neighbor_distance,
+    volumes_from_neighbors,
+};
 pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};
 pub use scalar::Scalar;

@@ -67,12 +67,10 @@ fn pse_converges_with_its_design_order_on_lattices() {
     // The finest pair whose error is above the round-off of 1/epsilon^m.
     for (order, n) in [(2, 64), (4, 48), (6, 40), (8, 48)] {
         let laplacian = order_on_lattice(Laplacian::<2>, order, n, |x| -2.0 * TAU * TAU * wave(x));
-        let mixed = order_on_lattice(D2::<1, 1>::default(), order, n, |x| {
-            -TAU * TAU * (TAU * x[0]).cos() * (TAU * x[1]).sin()
-        });
-        let first = order_on_lattice(D2::<1, 0>::default(), order, n, |x| {
-            TAU * (TAU * x[0]).cos() * (TAU * x[1]).cos()
-        });
+        let mixed =
+            order_on_lattice(D2::<1, 1>::default(), order, n, |x| -TAU * TAU * (TAU * x[0]).cos() * (TAU * x[1]).sin());
+        let first =
+            order_on_lattice(D2::<1, 0>::default(), order, n, |x| TAU * (TAU * x[0]).cos() * (TAU * x[1]).cos());
         let third = order_on_lattice(D2::<2, 1>::default(), order, n, |x| {
             TAU.powi(3) * (TAU * x[0]).sin() * (TAU * x[1]).sin()
         });
@@ -90,7 +88,8 @@ fn wide_gaussian_has_the_leading_error_of_its_fourth_moment() {
     let particles = Particles::lattice([0.0], [1.0], [n]).unwrap();
     let epsilon = 1.0 / n as f64;
     let pse =
-        Pse::with_kernels([WideGaussian::<1>::new()], Epsilon::global(epsilon).unwrap(), particles.volumes().unwrap()).unwrap();
+        Pse::with_kernels([WideGaussian::<1>::new()], Epsilon::global(epsilon).unwrap(), particles.volumes().unwrap())
+            .unwrap();
     let domain = Domain::periodic([0.0], [1.0]).unwrap();
     let rows = pse.assemble(&CellList::build(&particles, &domain, pse.cutoff()).unwrap()).unwrap();
     let f: Vec<f64> = particles.points().iter().map(|x| (TAU * x[0]).sin()).collect();
@@ -188,7 +187,8 @@ fn strength_form_conserves_on_unequal_volumes() -> Failure {
             .map(|p| {
                 let row = rows.row(p).unwrap();
                 let pairs = row.sources.iter().zip(row.weights);
-                let pairs: f64 = pairs.map(|(&q, w)| w[0].abs() * (strengths[q as usize].abs() + strengths[p].abs())).sum();
+                let pairs: f64 =
+                    pairs.map(|(&q, w)| w[0].abs() * (strengths[q as usize].abs() + strengths[p].abs())).sum();
                 pairs + (row.diagonal[0] * strengths[p]).abs()
             })
             .sum();
@@ -237,11 +237,8 @@ fn mirror_faces_equal_the_doubled_set() -> Failure {
             let rows = pse.assemble(&CellList::build(&half, &mirror, pse.cutoff())?)?;
             let whole = pse.assemble(&CellList::build(&doubled, &Domain::open(), pse.cutoff())?)?;
             let f: Vec<f64> = half.points().iter().map(|x| field(x[0])).collect();
-            let both: Vec<f64> = doubled
-                .points()
-                .iter()
-                .map(|x| if x[0] < 0.0 { sign * field(-x[0]) } else { field(x[0]) })
-                .collect();
+            let both: Vec<f64> =
+                doubled.points().iter().map(|x| if x[0] < 0.0 { sign * field(-x[0]) } else { field(x[0]) }).collect();
             let (mut a, mut b) = (vec![0.0; n], vec![0.0; 2 * n]);
             rows.apply(&f, &mut a)?;
             whole.apply(&both, &mut b)?;
@@ -293,7 +290,8 @@ fn gradient_divergence_and_velocity_contract_one_set_of_rows() -> Failure {
 fn typed_and_run_time_operators_give_identical_bits() -> Failure {
     let particles = Particles::jittered([0.0; 2], [1.0; 2], [30; 2], 0.01, 1)?;
     let epsilon = Epsilon::global(0.08)?;
-    let typed = Pse::new(D2::<2, 0>::default() + 3.0 * D2::<0, 2>::default(), 4, epsilon.clone(), particles.volumes()?)?;
+    let typed =
+        Pse::new(D2::<2, 0>::default() + 3.0 * D2::<0, 2>::default(), 4, epsilon.clone(), particles.volumes()?)?;
     let terms = [(MultiIndex::new([2, 0]), 1.0), (MultiIndex::new([0, 2]), 3.0)];
     let at_run_time = Pse::new(Expression::new(terms)?, 4, epsilon, particles.volumes()?)?;
     let neighbors = CellList::build(&particles, &unit_torus(), typed.cutoff())?;
@@ -353,9 +351,7 @@ fn settings_and_lengths_are_checked() -> Failure {
     let volumes = particles.volumes()?;
     let pse = || Pse::new(Laplacian::<2>, 2, Epsilon::global(0.08).unwrap(), volumes).unwrap();
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let setting = |error: parops::Error| {
-            matches!(*error.kind(), ErrorKind::Operator(OperatorError::Setting { value }) if value.to_bits() == bad.to_bits())
-        };
+        let setting = |error: parops::Error| matches!(*error.kind(), ErrorKind::Operator(OperatorError::Setting { value }) if value.to_bits() == bad.to_bits());
         assert!(setting(pse().support(bad).unwrap_err()));
         assert!(setting(pse().moment_tolerance(bad).unwrap_err()));
     }

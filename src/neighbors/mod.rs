@@ -4,12 +4,17 @@ mod brute_force;
 mod canonical;
 mod cell_list;
 mod grid;
+mod list;
+mod measure;
+mod order;
 mod placed;
 mod table;
 
 pub use brute_force::BruteForce;
 pub use canonical::Canonical;
 pub use cell_list::CellList;
+pub use list::NeighborList;
+pub use measure::{epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors};
 
 use crate::stencil::{Neighbor, Stencil};
 

@@ -3,10 +3,12 @@
 //! Each returns the first promise that is broken, with the numbers.
 
 mod kernel;
+mod provider;
 mod sample;
 mod smoothing;
 mod stepper;
 
 pub use kernel::{KernelFault, KernelLimits, check_kernel};
+pub use provider::{ProviderFault, check_provider, check_provider_against};
 pub use smoothing::check_smoothing_kernel;
 pub use stepper::{StepperFault, StepperReport, check_stepper};
