@@ -43,8 +43,6 @@ mod particles;
 mod scalar;
 mod scale;
 mod stencil;
-#[cfg(feature = "testing")]
-pub mod testing;
 mod time;
 
 pub use apply::{Apply, Field, MatrixFree, Report, Row, Rows};
