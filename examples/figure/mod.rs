@@ -51,8 +51,15 @@ const PALETTE: [RGBColor; 8] = [
 
 /// Draws panels side by side into one SVG file.
 pub fn draw(path: &Path, panels: &[(Axes, Vec<Curve>)]) -> Result<(), Box<dyn Error>> {
+    let mut svg = String::new();
+    drawing(&mut svg, panels).map_err(|error| error.to_string())?;
+    std::fs::write(path, svg)?;
+    Ok(())
+}
+
+fn drawing<'a>(svg: &'a mut String, panels: &[(Axes, Vec<Curve>)]) -> Result<(), Box<dyn Error + 'a>> {
     let width = SIZE.0 * panels.len() as u32;
-    let root = SVGBackend::new(path, (width, SIZE.1)).into_drawing_area();
+    let root = SVGBackend::with_string(svg, (width, SIZE.1)).into_drawing_area();
     root.fill(&WHITE)?;
     for ((axes, curves), area) in panels.iter().zip(root.split_evenly((1, panels.len()))) {
         let [x, y] = [bounds(curves, axes.logarithmic, |p| p.0), bounds(curves, axes.logarithmic, |p| p.1)];
@@ -66,14 +73,14 @@ pub fn draw(path: &Path, panels: &[(Axes, Vec<Curve>)]) -> Result<(), Box<dyn Er
     Ok(())
 }
 
-fn panel<X, Y>(
-    area: &DrawingArea<SVGBackend, plotters::coord::Shift>,
+fn panel<'a, X, Y>(
+    area: &DrawingArea<SVGBackend<'a>, plotters::coord::Shift>,
     axes: &Axes,
     curves: &[Curve],
     x: X,
     y: Y,
     label: fn(&f64) -> String,
-) -> Result<(), Box<dyn Error>>
+) -> Result<(), Box<dyn Error + 'a>>
 where
     X: AsRangedCoord<Value = f64>,
     Y: AsRangedCoord<Value = f64>,
@@ -136,24 +143,14 @@ where
     Ok(())
 }
 
-fn legend(x: i32, y: i32, mark: Mark, color: RGBColor) -> DynElement<'static, SVGBackend<'static>, (i32, i32)> {
-    let line =
-        PathElement::new(vec![(x, y), (x + 22, y)], color.stroke_width(if mark == Mark::Dashed { 1 } else { 2 }));
+fn legend<'a>(x: i32, y: i32, mark: Mark, color: RGBColor) -> DynElement<'static, SVGBackend<'a>, (i32, i32)> {
+    let line = |width| PathElement::new(vec![(x, y), (x + 22, y)], color.stroke_width(width)).into_dyn();
     match mark {
-        Mark::CirclesAlone => Circle::new((x + 11, y), 4, color.filled()).into_dyn(),
-        Mark::Circles => (EmptyElement::at((x, y))
-            + PathElement::new(vec![(0, 0), (22, 0)], color.stroke_width(2))
-            + Circle::new((11, 0), 4, color.filled()))
-        .into_dyn(),
-        Mark::Triangles => (EmptyElement::at((x, y))
-            + PathElement::new(vec![(0, 0), (22, 0)], color.stroke_width(2))
-            + TriangleMarker::new((11, 0), 6, color.filled()))
-        .into_dyn(),
-        Mark::Crosses => (EmptyElement::at((x, y))
-            + PathElement::new(vec![(0, 0), (22, 0)], color.stroke_width(2))
-            + Cross::new((11, 0), 5, color.stroke_width(2)))
-        .into_dyn(),
-        Mark::Line | Mark::Dashed => line.into_dyn(),
+        Mark::Circles | Mark::CirclesAlone => Circle::new((x + 11, y), 5, color.filled()).into_dyn(),
+        Mark::Triangles => TriangleMarker::new((x + 11, y), 7, color.filled()).into_dyn(),
+        Mark::Crosses => Cross::new((x + 11, y), 6, color.stroke_width(2)).into_dyn(),
+        Mark::Line => line(2),
+        Mark::Dashed => line(1),
     }
 }
 

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use parops::{
     Allowance, Apply, CellList, Domain, Epsilon, Euler, Exchange, Exponential, Face, Field, Kernel, Laplacian,
-    LatticeSpectrum, Method, Particles, Plan, Pse, Result, Rk4, Rows, Stepper, WideGaussian, integrate,
+    LatticeSpectrum, Particles, Plan, Pse, Result, Rk4, Rows, Stepper, WideGaussian, integrate,
 };
 
 use crate::benchmark::{D, DT, Record, T, X_PSE, exact, norms};

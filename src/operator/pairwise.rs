@@ -161,7 +161,8 @@ impl<K, const N: usize> Pairwise<K, N> {
     }
 
     /// Bound on the eigenvalues: S_p = sum_q V_q eta (q = p included) for a positive definite kernel of one epsilon
-    /// (errata 26), which is up to twice as sharp as Gershgorin's 2 sum_q V_q |eta|.
+    /// (errata 26; its matrix K has no negative eigenvalue, so diag(S) - K has none above S), otherwise Gershgorin's
+    /// 2 sum_q V_q |eta|.
     fn spectral_bound<const D: usize>(&self, row: &Stencil<D>, scratch: &PairScratch<D>) -> Result<f64>
     where
         K: Kernel<f64, D>,
@@ -170,14 +171,17 @@ impl<K, const N: usize> Pairwise<K, N> {
         let scale = times(1.0, 1.0 / self.epsilon.get(row.target())?, self.degree as usize);
         let mut bound = 0.0_f64;
         for (n, kernel) in self.kernels.iter().enumerate() {
-            let pairs = scratch.volume.iter().enumerate();
-            let sum: f64 = pairs.map(|(i, volume)| volume * scratch.eta[i * N + n].abs()).sum();
-            let symmetric = self.pairing == Pairing::Difference && low == high && self.degree == 2;
-            let own = self.own(kernel, row)?.abs();
-            let total = match self.pairing {
-                _ if symmetric && kernel.positive_definite() => sum + own,
-                Pairing::Summation => sum + own,
-                _ => 2.0 * sum,
+            let sum = |map: fn(f64) -> f64| -> f64 {
+                let pairs = scratch.volume.iter().enumerate();
+                pairs.map(|(i, volume)| volume * map(scratch.eta[i * N + n])).sum()
+            };
+            let symmetric = self.pairing == Pairing::Difference && low == high;
+            let total = if symmetric && kernel.positive_definite() {
+                sum(|eta| eta) + self.own(kernel, row)?
+            } else if self.pairing == Pairing::Summation {
+                sum(f64::abs) + self.own(kernel, row)?.abs()
+            } else {
+                2.0 * sum(f64::abs)
             };
             bound = worse(bound, total * scale);
         }
