@@ -53,7 +53,7 @@ fn leapfrog_started_by_euler_has_the_reference_errors_of_order_two() {
 
 #[test]
 fn leapfrog_grows_linearly_at_its_limit() {
-    // Errata 53: amplitudes 5.99, 56.6, 563 from an exact start, hence linear growth from any start that excites the root.
+    // Errata 53: the double root grows linearly, whatever the start that excites it.
     let growth = |n: u32| {
         let mut leapfrog = Leapfrog::new();
         let mut u = [1.0, 0.0];

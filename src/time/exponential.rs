@@ -116,8 +116,9 @@ impl Exponential {
             }
             Form::General(a) => {
                 let norm = a.column_iter().map(|column| column.lp_norm(1)).fold(0.0, f64::max);
-                if !(norm * t.abs() <= MOST) {
-                    return Err(TimeError::Limit { dt: t, limit: MOST / norm }.into());
+                let limit = MOST / norm;
+                if t.abs() > limit {
+                    return Err(TimeError::Limit { dt: t, limit }.into());
                 }
                 (a * t).exp() * start
             }
