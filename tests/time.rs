@@ -102,8 +102,10 @@ fn leapfrog_starts_anew_when_dt_changes_and_after_reset() {
     assert_eq!(u, euler(before, 0.05));
 }
 
+type Numbers = Vec<f64>;
+
 /// u_0' = -u_0^2 cos t, u_1' = u_1 (1 - u_1), u_2' = u_0 cos t: coupled, nonlinear, time-dependent.
-fn nonlinear(t: f64, u: &Vec<f64>, du: &mut Vec<f64>) -> Result<()> {
+fn nonlinear(t: f64, u: &Numbers, du: &mut Numbers) -> Result<()> {
     du[0] = -u[0] * u[0] * t.cos();
     du[1] = u[1] * (1.0 - u[1]);
     du[2] = u[0] * t.cos();
