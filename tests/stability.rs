@@ -1,11 +1,20 @@
 //! Step limits: lambda_max on lattices against reference values, and what is refused.
 
 use parops::{
-    Binding, Error, ErrorKind, Euler, Exchange, Kernel, LatticeSpectrum, Leapfrog, MultiIndex, NeighborError,
-    OperatorError, ParticleError, Plan, Policy, Rk4, StepLimit, Stepper, Term, TimeError, integrate,
-    wide_gaussian_decay,
+    Allowance, Apply, Binding, Cutoff, Epsilon, Error, ErrorKind, Euler, Exchange, Exponential, Kernel, Laplacian,
+    LatticeSpectrum, Leapfrog, MultiIndex, Neighbor, NeighborError, Neighbors, OperatorError, ParticleError, Plan,
+    Policy, Pse, Rk4, Rows, StepLimit, Stepper, Term, TimeError, Volumes, WideGaussian, integrate, wide_gaussian_decay,
 };
+use proptest::prelude::*;
 use serde_json::Value;
+
+fn cases() -> u32 {
+    std::env::var("PAROPS_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(1000)
+}
+
+fn config() -> ProptestConfig {
+    ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() }
+}
 
 fn table(text: &str) -> Value {
     serde_json::from_str(text).unwrap()
@@ -94,7 +103,7 @@ fn wide_gaussian_matches<const D: usize>() {
         assert!(relative(full.lambda_max, number("lambda_max_no_cutoff")) < ROUNDING, "{D} {delta}: {full:?}");
         assert!(relative(full.coefficient[0], number("effective_D_over_D_no_cutoff")) < ROUNDING, "{D} {delta}");
 
-        let cut = LatticeSpectrum::scan(&kernel, delta, 5.0).unwrap();
+        let cut = LatticeSpectrum::scan(&WideGaussian::<D>::new(), delta, 5.0).unwrap();
         assert!(relative(cut.lambda_max, number("lambda_max_cutoff_5eps")) < ROUNDING, "{D} {delta}: {cut:?}");
         assert!(relative(cut.coefficient[D - 1], number("effective_D_over_D_cutoff_5eps")) < ROUNDING, "{D} {delta}");
 
@@ -338,4 +347,102 @@ fn scan_refuses_kernels_and_lattices_it_cannot_bound() {
         kind(LatticeSpectrum::scan(&Gaussian::<1>::wide(), 1.0, 5.0).unwrap().limit(1.0, 0.0).unwrap_err()),
         ErrorKind::Particle(ParticleError::Epsilon { epsilon: 0.0 })
     );
+}
+
+/// Brute force over points in an open plane: a provider as a user would write it.
+struct AllPairs {
+    points: Vec<[f64; 2]>,
+    reach: f64,
+}
+
+impl Neighbors<2> for AllPairs {
+    fn targets(&self) -> usize {
+        self.points.len()
+    }
+    fn sources(&self) -> usize {
+        self.points.len()
+    }
+    fn center(&self, p: usize) -> Option<usize> {
+        Some(p)
+    }
+    fn cutoff(&self, _: usize) -> f64 {
+        self.reach
+    }
+    fn reach(&self) -> f64 {
+        self.reach
+    }
+    fn generation(&self) -> u64 {
+        0
+    }
+    fn for_each(&self, p: usize, cutoff: f64, mut visit: impl FnMut(Neighbor<2>)) {
+        let center = self.points[p];
+        for (q, x) in self.points.iter().enumerate().filter(|&(q, _)| q != p) {
+            let separation = [center[0] - x[0], center[1] - x[1]];
+            if separation[0].hypot(separation[1]) <= cutoff {
+                visit(Neighbor { q, separation, sign: 1 });
+            }
+        }
+    }
+}
+
+/// The largest eigenvalue modulus of PSE rows on a set with volumes V: that of the symmetric V^1/2 A V^-1/2.
+fn spectral_radius(rows: &Rows<[f64; 1]>, volumes: &[f64]) -> f64 {
+    let scaled = |u: &[f64], du: &mut [f64]| {
+        let f: Vec<f64> = u.iter().zip(volumes).map(|(u, v)| u / v.sqrt()).collect();
+        rows.apply(&f, du)?;
+        du.iter_mut().zip(volumes).for_each(|(du, v)| *du *= v.sqrt());
+        Ok(())
+    };
+    Exponential::new(volumes.len(), scaled).unwrap().spectral_radius().unwrap()
+}
+
+proptest! {
+    #![proptest_config(config())]
+
+    #[test]
+    fn row_bounds_of_pse_bound_the_spectrum_on_any_particle_set(
+        set in prop::collection::vec(([0.0..1.0, 0.0..1.0], 0.5..2.0), 2..24), epsilon in 0.02..0.5, order in 0..3_usize,
+    ) {
+        let points: Vec<[f64; 2]> = set.iter().map(|particle| particle.0).collect();
+        let v: Vec<f64> = set.iter().map(|particle| particle.1 / set.len() as f64).collect();
+        let (epsilon, volumes) = (Epsilon::global(epsilon).unwrap(), Volumes::each(v.clone()).unwrap());
+        let provider = |cutoff: Cutoff| AllPairs { points: points.clone(), reach: cutoff.0 };
+        let rows = if order == 2 {
+            let pse = Pse::<WideGaussian<2>>::with_kernels([WideGaussian::new()], epsilon, &volumes).unwrap();
+            pse.clone().allow(Allowance::Everywhere).assemble(&provider(pse.cutoff())).unwrap()
+        } else {
+            let pse = Pse::new(Laplacian::<2>, [2, 4][order], epsilon, &volumes).unwrap();
+            pse.clone().allow(Allowance::Everywhere).assemble(&provider(pse.cutoff())).unwrap()
+        };
+        let (bound, radius) = (rows.report().spectral_bound, spectral_radius(&rows, &v));
+        prop_assert!(radius <= bound * (1.0 + ROUNDING), "{} > {}", radius, bound);
+    }
+}
+
+#[test]
+fn row_bound_of_a_positive_definite_kernel_is_sharp_on_a_dense_set() {
+    // Sixty particles within one epsilon: the fastest mode sees hardly any neighbor, and S_p is nearly the same for all.
+    let points: Vec<[f64; 2]> = (0..60).map(|p| [0.002 * f64::from(p), 0.0]).collect();
+    let v = vec![0.01; 60];
+    let pse = Pse::new(Laplacian::<2>, 2, Epsilon::global(1.0).unwrap(), &Volumes::each(v.clone()).unwrap()).unwrap();
+    let pse = pse.allow(Allowance::Everywhere);
+    let rows = pse.assemble(&AllPairs { points, reach: pse.cutoff().0 }).unwrap();
+    let (bound, radius) = (rows.report().spectral_bound, spectral_radius(&rows, &v));
+    assert!(radius <= bound && radius > 0.99 * bound, "{radius} {bound}");
+}
+
+#[test]
+fn advection_limits_of_central_pse_follow_from_the_imaginary_intervals() {
+    let bounds = bounds();
+    let (rk4, leapfrog, euler) = (Rk4::<f64>::new(), Leapfrog::<f64>::new(), Euler::<f64>::new());
+    let entries = bounds["advection_central"].as_object().unwrap();
+    assert_eq!(entries.len(), 12);
+    for (name, entry) in entries {
+        let number = |key: &str| entry[key].as_f64().unwrap();
+        for (stepper, key) in [(&rk4 as &dyn Stepper<f64>, "rk4"), (&leapfrog, "leapfrog"), (&euler, "explicit_euler")]
+        {
+            let limit = stepper.imaginary_interval() / number("max_abs_symbol");
+            assert!((limit - number(key)).abs() <= 4.0 * f64::EPSILON * limit, "{name} {key}: {limit}");
+        }
+    }
 }

@@ -53,7 +53,7 @@ fn leapfrog_started_by_euler_has_the_reference_errors_of_order_two() {
 
 #[test]
 fn leapfrog_grows_linearly_at_its_limit() {
-    // Errata 53: amplitudes 5.99, 56.6, 563 from an exact start, hence linear growth from any start that excites the root.
+    // Errata 53: the double root grows linearly, whatever the start that excites it.
     let growth = |n: u32| {
         let mut leapfrog = Leapfrog::new();
         let mut u = [1.0, 0.0];
@@ -102,8 +102,10 @@ fn leapfrog_starts_anew_when_dt_changes_and_after_reset() {
     assert_eq!(u, euler(before, 0.05));
 }
 
+type Numbers = Vec<f64>;
+
 /// u_0' = -u_0^2 cos t, u_1' = u_1 (1 - u_1), u_2' = u_0 cos t: coupled, nonlinear, time-dependent.
-fn nonlinear(t: f64, u: &Vec<f64>, du: &mut Vec<f64>) -> Result<()> {
+fn nonlinear(t: f64, u: &Numbers, du: &mut Numbers) -> Result<()> {
     du[0] = -u[0] * u[0] * t.cos();
     du[1] = u[1] * (1.0 - u[1]);
     du[2] = u[0] * t.cos();

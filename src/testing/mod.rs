@@ -7,8 +7,10 @@ mod provider;
 mod sample;
 mod smoothing;
 mod stepper;
+mod stepper_fault;
 
 pub use kernel::{KernelFault, KernelLimits, check_kernel};
 pub use provider::{ProviderFault, check_provider, check_provider_against};
 pub use smoothing::check_smoothing_kernel;
-pub use stepper::{StepperFault, StepperReport, check_stepper};
+pub use stepper::{StepperReport, check_stepper};
+pub use stepper_fault::StepperFault;

@@ -91,7 +91,7 @@ impl<const D: usize> LatticeSpectrum<D> {
         }
         let reach = (radius / delta * (1.0 + SHELL)).floor();
         let nodes = 2.0 * reach.max(4.0) + 1.0;
-        if !(nodes.powi(D as i32) <= MOST_POINTS) {
+        if nodes.powi(D as i32) > MOST_POINTS {
             return Err(NeighborError::Cells { axis: 0, cells: nodes, limit: MOST_POINTS.powf(1.0 / D as f64) }.into());
         }
         let (symbol, coefficient) = fold(kernel, delta, radius, reach as usize + 1)?;
@@ -102,8 +102,9 @@ impl<const D: usize> LatticeSpectrum<D> {
         let slowest = extreme(&symbol, &grid, nodes, -1.0).map_or(f64::INFINITY, |(lambda, _)| lambda);
         let sampled = grid.iter().skip(1).copied().fold(slowest, f64::min);
         // Near kappa = 0 lambda is sum_i coefficient_i kappa_i^2: negative coefficients grow at any resolution.
-        let smallest = coefficient.iter().copied().filter(|&c| !(c > 0.0)).fold(sampled, f64::min);
-        if !(smallest > 0.0 && lambda_max > 0.0) {
+        let smallest = coefficient.iter().copied().filter(|&c| c <= 0.0).fold(sampled, f64::min);
+        let decays = smallest > 0.0 && lambda_max > 0.0 && lambda_max.is_finite();
+        if !decays {
             return Err(TimeError::Growing { rate: smallest }.into());
         }
         Ok(Self { lambda_max, fastest: fastest.map(|theta| folded(theta) / delta), smallest, coefficient })
@@ -161,7 +162,7 @@ fn fold<const D: usize>(
             }
             let image = std::array::from_fn(|i| if mirror >> i & 1 == 1 { -z[i] } else { z[i] });
             let value = kernel.value(&image);
-            if !value.is_finite() {
+            if !(cell * value).is_finite() {
                 return Err(OperatorError::Weight { q: index, weight: value }.into());
             }
             *weight += cell * value;

@@ -13,7 +13,7 @@ use crate::error::Result;
 ///
 /// ```
 /// use parops::{Leapfrog, Stepper};
-/// let (mut leapfrog, mut u) = (Leapfrog::new(), [1.0, 0.0]);
+/// let (mut leapfrog, mut u) = (Leapfrog::new(), [1.0_f64, 0.0]);
 /// for n in 0..1000 {
 ///     leapfrog.step(0.1 * n as f64, 0.1, &mut u, &mut |_, u, du| {
 ///         *du = [u[1], -u[0]];

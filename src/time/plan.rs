@@ -57,7 +57,7 @@ impl Plan {
         let dt = (self.end - self.start) / steps;
         let t = if self.start.abs() > self.end.abs() { self.start } else { self.end };
         // Rounding is coarsest where |t| is largest.
-        if !(steps <= MOST) || t + dt == t {
+        if steps > MOST || t + dt == t {
             return Err(TimeError::NoProgress { t, dt }.into());
         }
         Ok(Self { dt, steps: steps as u64, ..self })
@@ -85,7 +85,7 @@ impl Plan {
         if self.dt <= limit {
             return Ok(self);
         }
-        if !(limit > 0.0) {
+        if limit <= 0.0 {
             return Err(TimeError::Limit { dt: self.dt, limit }.into());
         }
         if self.steps == 0 {
