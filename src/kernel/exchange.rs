@@ -53,10 +53,11 @@ struct Piece<const D: usize> {
 type ExactPiece<const D: usize> = (ExactPolynomial<D>, Vec<Rational>);
 
 impl<const D: usize> Exchange<D> {
-    /// The largest degree m up to which every kernel exists, whatever the multi-index, for D <= 3 and r <= 8.
+    /// The largest degree m up to which the derivation fits 128 bits, whatever the multi-index, for D <= 3 and r <= 8.
     ///
-    /// Beyond it some derivations leave 128-bit integers; those are refused, the others still succeed.
-    pub const DEGREE_LIMIT: u32 = 20;
+    /// Beyond it derivations that overflow are refused; the others still succeed. A value is within rounding of the
+    /// absolute terms of P, which cancel ever more with growing m.
+    pub const DEGREE_LIMIT: u32 = 41;
 
     /// The kernel of sum_i c_i D^beta_i to order r = `order`.
     ///
@@ -205,11 +206,11 @@ impl<T: Scalar, const D: usize> Kernel<T, D> for Exchange<D> {
         self.order
     }
 
-    /// 6, and above |beta| = 6 sqrt(3.5 m + 1.75 r) where that is more: what lies outside holds less than
-    /// 1e-5 alpha! max |c_i| of any moment M_alpha with a condition.
+    /// 6, and from m = 6 on sqrt(3.75 m + 1.8 r) where that is more: outside lies less than 1e-5 alpha! max |c_i|
+    /// of any moment M_alpha with a condition.
     fn support(&self) -> f64 {
         // Fitted to the radii at which 1e-5 is reached, for m <= 20.
-        (3.5 * f64::from(self.degree) + 1.75 * f64::from(self.order)).max(36.0).sqrt()
+        (3.75 * f64::from(self.degree) + 1.8 * f64::from(self.order)).max(36.0).sqrt()
     }
 
     /// 2/3, and 1/2 for r = 8 (errata 7); from m = 3 on 1/sqrt(0.36 m + 0.23 r + 0.5) where that is less. There a
