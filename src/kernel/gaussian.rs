@@ -18,8 +18,9 @@ use crate::scalar::{Scalar, square};
 /// ```
 /// use parops::{Gaussian, Kernel, MultiIndex, SmoothingKernel};
 /// let w = Gaussian::<1>::new();
-/// assert!((w.value(&[0.0]) - 0.3989422804014327_f64).abs() < 1e-16);
-/// let second = w.derivative(MultiIndex::new([2]), &[2.0])?;
+/// let top: f64 = w.value(&[0.0]);
+/// assert!((top - 0.3989422804014327).abs() < 1e-16);
+/// let second: f64 = w.derivative(MultiIndex::new([2]), &[2.0])?;
 /// assert!((second - 3.0 * w.value(&[2.0])).abs() < 1e-16);
 /// # parops::Result::Ok(())
 /// ```
