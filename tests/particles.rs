@@ -125,7 +125,7 @@ fn constructors_refuse_illegal_boxes_and_counts() {
     assert_eq!(error, Error::from(DomainError::Unbounded { axis: 0, lower: 0.0, upper: inf }));
     for counts in [[1 << 20; 2], [usize::MAX; 2]] {
         let error = Particles::lattice([0.0; 2], [1.0; 2], counts).unwrap_err();
-        let found = counts[0].checked_mul(counts[1]).unwrap_or(usize::MAX);
+        let found = counts[0].saturating_mul(counts[1]);
         assert_eq!(error, Error::from(ParticleError::TooMany { count: found, limit: parops::PARTICLES_HIGH }));
     }
 }
