@@ -1,0 +1,212 @@
+//! The provider checker: ours pass, a provider written by a user passes, and every fault is caught.
+
+use parops::testing::{ProviderFault, check_provider, check_provider_against};
+use parops::{BruteForce, CellList, Cutoff, Domain, Face, Neighbor, NeighborList, Neighbors, Particles, Stencil};
+
+/// A provider as a user would write it: equal points on a line, found by index arithmetic.
+struct Line {
+    count: usize,
+    spacing: f64,
+}
+
+impl Neighbors<1> for Line {
+    fn targets(&self) -> usize {
+        self.count
+    }
+    fn sources(&self) -> usize {
+        self.count
+    }
+    fn center(&self, p: usize) -> Option<usize> {
+        Some(p)
+    }
+    fn cutoff(&self, _: usize) -> f64 {
+        self.reach()
+    }
+    fn reach(&self) -> f64 {
+        2.5 * self.spacing
+    }
+    fn generation(&self) -> u64 {
+        0
+    }
+    fn for_each(&self, p: usize, cutoff: f64, mut visit: impl FnMut(Neighbor<1>)) {
+        for q in p.saturating_sub(2)..(p + 3).min(self.count) {
+            let separation = [(p as f64 - q as f64) * self.spacing];
+            if q != p && separation[0].abs() <= cutoff.min(self.reach()) {
+                visit(Neighbor { q, separation, sign: 1 });
+            }
+        }
+    }
+}
+
+#[test]
+fn a_foreign_provider_passes_and_serves_lists() {
+    let line = Line { count: 9, spacing: 0.25 };
+    assert_eq!(check_provider(&line), Ok(()));
+    let points = (0..9).map(|i| [0.25 * f64::from(i)]).collect();
+    let oracle = BruteForce::build(&Particles::new(points).unwrap(), &Domain::open(), Cutoff(0.625)).unwrap();
+    assert_eq!(check_provider_against(&line, &oracle), Ok(()));
+    assert_eq!(check_provider_against(&NeighborList::from_provider(&line).unwrap(), &oracle), Ok(()));
+    assert_eq!(check_provider(&(&line).canonical()), Ok(()));
+}
+
+#[test]
+fn our_providers_pass_on_mixed_faces() {
+    let particles = Particles::random([0.0; 2], [1.0; 2], 150, 4).unwrap();
+    let faces = [[Face::MirrorOdd, Face::MirrorEven], [Face::Periodic; 2]];
+    for domain in [Domain::open(), Domain::new([0.0; 2], [1.0; 2], faces).unwrap()] {
+        let oracle = BruteForce::build(&particles, &domain, Cutoff(0.4)).unwrap();
+        let cells = CellList::build(&particles, &domain, Cutoff(0.4)).unwrap();
+        let list = NeighborList::from_provider(&cells).unwrap();
+        assert_eq!((check_provider(&oracle), check_provider(&cells), check_provider(&list)), (Ok(()), Ok(()), Ok(())));
+        assert_eq!(check_provider_against(&cells, &oracle), Ok(()));
+        assert_eq!(check_provider_against(&list, &oracle), Ok(()));
+        assert_eq!(check_provider_against(&cells.canonical(), &oracle), Ok(()));
+    }
+}
+
+#[test]
+fn particles_on_an_even_mirror_pass_against_the_oracle_only() {
+    let half = Domain::new([0.0], [f64::INFINITY], [[Face::MirrorEven, Face::Open]]).unwrap();
+    let particles = Particles::new(vec![[0.0], [0.5]]).unwrap();
+    let cells = CellList::build(&particles, &half, Cutoff(1.0)).unwrap();
+    assert_eq!(check_provider(&cells), Err(ProviderFault::OwnCenter { p: 0 }));
+    assert_eq!(check_provider_against(&cells, &BruteForce::build(&particles, &half, Cutoff(1.0)).unwrap()), Ok(()));
+}
+
+/// What the wrong provider below gets wrong.
+#[derive(Clone, Copy, PartialEq)]
+enum Wrong {
+    Owned,
+    Cutoff,
+    Center,
+    Source,
+    OwnCenter,
+    NotFinite,
+    Beyond,
+    Sign,
+    Count,
+    Gather,
+    Subset,
+    OneSided,
+    Lost,
+    Targets,
+}
+
+struct Faulty(Wrong, Line);
+
+impl Neighbors<1> for Faulty {
+    fn targets(&self) -> usize {
+        self.1.count - usize::from(self.0 == Wrong::Targets)
+    }
+    fn sources(&self) -> usize {
+        self.1.sources()
+    }
+    fn owned(&self) -> usize {
+        self.sources() + usize::from(self.0 == Wrong::Owned)
+    }
+    fn center(&self, p: usize) -> Option<usize> {
+        Some(if self.0 == Wrong::Center { p + 1 } else { p })
+    }
+    fn cutoff(&self, p: usize) -> f64 {
+        self.1.cutoff(p) * if self.0 == Wrong::Cutoff { f64::NAN } else { 1.0 }
+    }
+    fn reach(&self) -> f64 {
+        self.1.reach()
+    }
+    fn generation(&self) -> u64 {
+        0
+    }
+    fn for_each(&self, p: usize, cutoff: f64, mut visit: impl FnMut(Neighbor<1>)) {
+        let asked = match self.0 {
+            Wrong::Beyond => self.reach(),
+            Wrong::Subset if cutoff < self.reach() => 0.5 * cutoff,
+            _ => cutoff,
+        };
+        if self.0 == Wrong::OwnCenter {
+            visit(Neighbor { q: p, separation: [0.0], sign: 1 });
+        }
+        self.1.for_each(p, asked, |mut neighbor| {
+            match self.0 {
+                Wrong::Source => neighbor.q += self.1.count,
+                Wrong::NotFinite => neighbor.separation = [f64::NAN],
+                Wrong::Sign => neighbor.sign = 2,
+                Wrong::OneSided if p == 4 && neighbor.q == 3 => return,
+                Wrong::Lost if p + neighbor.q == 7 => return,
+                _ => {}
+            }
+            visit(neighbor);
+        });
+    }
+    fn gather(&self, p: usize, cutoff: f64, row: &mut Stencil<1>) {
+        let center = if self.0 == Wrong::Gather { None } else { self.center(p) };
+        row.reset(p, center, cutoff);
+        self.for_each(p, cutoff, |neighbor| row.push(neighbor));
+    }
+    fn count(&self, p: usize, cutoff: f64) -> usize {
+        let mut count = usize::from(self.0 == Wrong::Count);
+        self.for_each(p, cutoff, |_| count += 1);
+        count
+    }
+}
+
+#[test]
+fn every_fault_of_a_provider_is_caught() {
+    let line = || Line { count: 8, spacing: 1.0 };
+    let fault = |wrong| check_provider(&Faulty(wrong, line())).unwrap_err();
+    assert_eq!(fault(Wrong::Owned), ProviderFault::Bounds { p: 0, found: 9.0, limit: 8.0 });
+    assert!(matches!(fault(Wrong::Cutoff), ProviderFault::Bounds { p: 0, limit: 2.5, .. }));
+    assert_eq!(fault(Wrong::Center), ProviderFault::Center { p: 7, center: 8, sources: 8 });
+    assert_eq!(fault(Wrong::Source), ProviderFault::Source { p: 0, q: 9 });
+    assert_eq!(fault(Wrong::OwnCenter), ProviderFault::OwnCenter { p: 0 });
+    assert!(matches!(fault(Wrong::NotFinite), ProviderFault::Separation { p: 0, q: 1, .. }));
+    assert_eq!(fault(Wrong::Beyond), ProviderFault::Separation { p: 0, q: 2, distance: 2.0, cutoff: 1.875 });
+    assert_eq!(fault(Wrong::Sign), ProviderFault::Sign { p: 0, q: 1, sign: 2 });
+    assert_eq!(fault(Wrong::Count), ProviderFault::Disagree { p: 0, visited: 2, gathered: 2, counted: 3 });
+    assert_eq!(fault(Wrong::Gather), ProviderFault::Disagree { p: 0, visited: 2, gathered: 2, counted: 2 });
+    assert_eq!(fault(Wrong::Subset), ProviderFault::NotMonotone { p: 0, cutoff: 1.875, found: 0, expected: 1 });
+    assert_eq!(fault(Wrong::OneSided), ProviderFault::NotSymmetric { p: 3, q: 4 });
+
+    let points = (0..8).map(|i| [f64::from(i)]).collect();
+    let oracle = BruteForce::build(&Particles::new(points).unwrap(), &Domain::open(), Cutoff(2.5)).unwrap();
+    assert_eq!(check_provider(&Faulty(Wrong::Lost, line())), Ok(()));
+    let against = |wrong| check_provider_against(&Faulty(wrong, line()), &oracle).unwrap_err();
+    assert_eq!(against(Wrong::Lost), ProviderFault::NotTheOracle { p: 3, found: 3, expected: 4 });
+    assert_eq!(against(Wrong::Targets), ProviderFault::NotTheOracle { p: 7, found: 8, expected: 8 });
+}
+
+#[test]
+fn rows_that_change_when_asked_again_are_caught() {
+    /// Turns the row around on every other visit, but not the first three, which `gather` and `count` compare with.
+    struct Unsteady(Line, std::sync::atomic::AtomicUsize);
+    impl Neighbors<1> for Unsteady {
+        fn targets(&self) -> usize {
+            self.0.targets()
+        }
+        fn sources(&self) -> usize {
+            self.0.sources()
+        }
+        fn center(&self, p: usize) -> Option<usize> {
+            Some(p)
+        }
+        fn cutoff(&self, p: usize) -> f64 {
+            self.0.cutoff(p)
+        }
+        fn reach(&self) -> f64 {
+            self.0.reach()
+        }
+        fn generation(&self) -> u64 {
+            0
+        }
+        fn for_each(&self, p: usize, cutoff: f64, visit: impl FnMut(Neighbor<1>)) {
+            let mut row = Stencil::default();
+            self.0.gather(p, cutoff, &mut row);
+            let mut row: Vec<_> = row.iter().collect();
+            if self.1.fetch_add(1, std::sync::atomic::Ordering::Relaxed) >= 4 {
+                row.reverse();
+            }
+            row.into_iter().for_each(visit);
+        }
+    }
+    let unsteady = Unsteady(Line { count: 8, spacing: 1.0 }, 0.into());
+    assert_eq!(check_provider(&unsteady), Err(ProviderFault::Unsteady { p: 0 }));
+}
