@@ -8,9 +8,9 @@ pub struct Claim {
     pub holds: bool,
 }
 
-/// Errors below this are round-off, in f64: the 100 to 1000 steps each add a few units in the last place of u <= 0.43,
-/// and the truncated kernels leave their own 1e-14.
-const FLOOR: f64 = 2e-13;
+/// Errors below this are round-off, in f64: 400 stages each round u <= 0.43 by up to 1.1e-16, twice over, 4e-14, and as
+/// much again for the sums.
+const FLOOR: f64 = 1e-13;
 
 /// Checks every claim of the benchmark against the table.
 pub fn check(records: &[Record]) -> Vec<Claim> {
@@ -41,26 +41,18 @@ pub fn check(records: &[Record]) -> Vec<Claim> {
     }
 
     let walks = series("rw", "f64", 0, "euler");
-    let slope = slope(&walks);
-    claim((slope + 0.5).abs() <= 0.15, format!("random walk converges like N^-1/2: fitted slope {slope:.3}"));
+    let walked = slope(&walks);
+    claim((walked + 0.5).abs() <= 0.15, format!("random walk converges like N^-1/2: fitted slope {walked:.3}"));
 
-    for stepper in ["euler", "rk4"] {
-        let single: Vec<&Record> = series("pse", "f32", 2, stepper).into_iter().filter(|r| r.n >= 400).collect();
-        let errors: Vec<f64> = single.iter().map(|r| r.l2).collect();
-        claim(
-            !errors.is_empty() && errors.iter().all(|l2| (1e-7..=2e-6).contains(l2)),
-            format!("the f32 error ({stepper}) stays between 1e-7 and 2e-6 from N = 400 on: {}", powers(&errors)),
-        );
-        if let [first, .., last] = single.as_slice() {
-            let ratio = first.l2 / last.l2;
-            let following = (last.n as f64 / first.n as f64).powi(2);
-            claim(
-                ratio < following / 4.0,
-                format!(
-                    "and does not follow order 2: it falls {ratio:.2} times where order 2 falls {following:.0} times"
-                ),
-            );
-        }
+    let single: Vec<&Record> = series("pse", "f32", 2, "rk4").into_iter().filter(|r| r.n >= 400).collect();
+    let errors: Vec<f64> = single.iter().map(|r| r.l2).collect();
+    claim(
+        !errors.is_empty() && errors.iter().all(|l2| (1e-7..=2e-6).contains(l2)),
+        format!("the f32 error (rk4) stays between 1e-7 and 2e-6 from N = 400 on: {}", powers(&errors)),
+    );
+    if single.len() > 1 {
+        let fitted = -slope(&single);
+        claim(fitted < 1.5, format!("and does not follow order 2 there: fitted order {fitted:.2}"));
     }
 
     let at_50 = |runs: &[&Record]| runs.iter().find(|r| r.n == 50).map(|r| r.l2);
@@ -69,6 +61,28 @@ pub fn check(records: &[Record]) -> Vec<Claim> {
         claim(ratio >= 1000.0, format!("at N = 50 PSE is {ratio:.0} times more accurate than the random walk (rms)"));
     }
     claims
+}
+
+/// Where the time error of Euler shows: it has the opposite sign of the space error of order 2, so that the observed
+/// order first rises and then falls, and no band is claimed for it.
+pub fn euler_against_rk4(records: &[Record]) -> String {
+    let error = |stepper: &str, order: u32, n: usize| {
+        let run = |r: &&Record| (r.method, r.scalar, r.stepper, r.order, r.n) == ("pse", "f64", stepper, order, n);
+        records.iter().find(run).map(|r| r.l2)
+    };
+    let mut lines = Vec::new();
+    for order in [2, 4, 6, 8] {
+        let mut sizes = records.iter().filter(|r| (r.method, r.order) == ("pse", order)).map(|r| r.n);
+        let first = sizes.find(|&n| match (error("euler", order, n), error("rk4", order, n)) {
+            (Some(euler), Some(rk4)) => (euler - rk4).abs() > 0.1 * rk4,
+            _ => false,
+        });
+        lines.push(match first {
+            Some(n) => format!("order {order}: the time error of Euler exceeds a tenth of the error from N = {n} on"),
+            None => format!("order {order}: the time error of Euler does not show"),
+        });
+    }
+    lines.join("\n")
 }
 
 /// Slope of ln l2 over ln N by least squares.
