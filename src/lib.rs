@@ -69,3 +69,8 @@ pub use time::*;
 
 #[cfg(feature = "testing")]
 pub mod testing;
+
+/// The program of the README, compiled and run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;
