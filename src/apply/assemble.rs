@@ -16,7 +16,9 @@ impl<S: Outputs, T: Field> Rows<S, T> {
     /// [`canonical`](Neighbors::canonical) neighbors also over providers and after renumbering.
     ///
     /// # Errors
-    /// [`NeighborError::Reach`] naming the target whose cutoff is beyond the provider; what the method refuses; and
+    /// [`NeighborError::Reach`] naming the target whose cutoff is beyond the provider; [`NeighborError::Source`] and
+    /// [`NeighborError::Offsets`] for a provider that names sources it does not have or counts others than it gathers;
+    /// what the method refuses; and
     /// [`OperatorError::Overlap`](crate::OperatorError::Overlap) or
     /// [`OperatorError::Moment`](crate::OperatorError::Moment) naming the worst row that breaks a limit without leave.
     pub fn assemble<const D: usize, M: Method<D, Out = S>, P: Neighbors<D>>(method: &M, neighbors: &P) -> Result<Self> {
@@ -42,6 +44,10 @@ impl<S: Outputs, T: Field> Rows<S, T> {
                 let p = block.first + i;
                 worker.fill(method, neighbors, p)?;
                 let range = offsets[p] - offsets[block.first]..offsets[p + 1] - offsets[block.first];
+                let (found, needed) = (offsets[p] + worker.row.len(), offsets[p + 1]);
+                if found != needed {
+                    return Err(Error::from(NeighborError::Offsets { row: p, found, needed }).at(p));
+                }
                 block.columns[range.clone()].copy_from_slice(worker.row.sources());
                 for (stored, w) in block.weights[range].iter_mut().zip(&worker.weights) {
                     *stored = w.map(T::lift);
@@ -114,6 +120,11 @@ impl<const D: usize, M: Method<D>> Worker<D, M> {
     /// Makes the weights of target p.
     pub(super) fn fill<P: Neighbors<D>>(&mut self, method: &M, neighbors: &P, p: usize) -> Result<()> {
         neighbors.gather(p, cutoff(method, neighbors, p)?, &mut self.row);
+        let sources = neighbors.sources();
+        let named = self.row.sources().iter().map(|&q| q as usize).chain(self.row.center());
+        if let Some(q) = named.max().filter(|&q| q >= sources) {
+            return Err(Error::from(NeighborError::Source { q, sources }).at(p));
+        }
         self.weights.clear();
         self.weights.resize(self.row.len(), M::Out::ZERO);
         let filled = method.weights(&self.row, &mut self.scratch, &mut self.weights, &mut self.diagonal);
