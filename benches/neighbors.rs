@@ -4,7 +4,7 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use parops::{CellList, Cutoff, Domain, Neighbors, Particles, Stencil};
+use parops::{CellList, Cutoff, Domain, NeighborList, Neighbors, Particles, Stencil};
 
 /// In spacings: a ball of this radius holds 4/3 pi 1.94^3 = 30.6 particles.
 const CUTOFF: f64 = 1.94;
@@ -16,7 +16,7 @@ fn sizes() -> &'static [usize] {
 
 fn cell_list(c: &mut Criterion) {
     let mut group = c.benchmark_group("cell list 3D");
-    group.sample_size(10).measurement_time(Duration::from_secs(8));
+    group.sample_size(10).measurement_time(Duration::from_secs(3));
     for &m in sizes() {
         let n = m * m * m;
         let cutoff = Cutoff(CUTOFF / m as f64);
@@ -39,6 +39,9 @@ fn cell_list(c: &mut Criterion) {
                         black_box(&row);
                     }
                 });
+            });
+            group.bench_function(BenchmarkId::new(format!("stored list {name}"), n), |b| {
+                b.iter(|| NeighborList::from_provider(&neighbors).expect("a list that fits"));
             });
         }
     }

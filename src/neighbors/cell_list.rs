@@ -14,9 +14,9 @@ use crate::stencil::{Neighbor, Stencil};
 ///
 /// Images within the reach of a face are stored beside the sources, so that a query knows no boundaries. Their
 /// separations are evaluated from the sources by the same expressions as everywhere ([`Domain`]), so that rows are
-/// those of [`BruteForce`](crate::BruteForce) bit for bit, in another order. Cells are half a cutoff wide up to
-/// three dimensions, wider where the set is too thin for that. Where even those would be too many, as with an outlier
-/// at 10^12 spacings, only occupied cells are stored. Rows come in the order of the cells.
+/// those of [`BruteForce`](crate::BruteForce) bit for bit, in another order. Cells are a cutoff wide, a quarter of it
+/// along the last axis, and twice that where the set is too thin. Where even those would be too many, as with an
+/// outlier at 10^12 spacings, only occupied cells are stored. Rows come in the order of the cells.
 ///
 /// ```
 /// use parops::{CellList, Cutoff, Domain, Neighbors, Particles};
@@ -102,51 +102,70 @@ impl<const D: usize> CellList<D> {
         self.origins.iter().filter(|origin| origin.image == Image::OWN).map(|origin| origin.source as usize)
     }
 
-    /// Calls `found(source, separation, image)` for every neighbor of p.
+    /// Calls `found` for every neighbor of p.
     ///
     /// Candidates are first filtered without a branch into a small buffer, because whether a candidate is within the
     /// cutoff cannot be predicted; what remains is measured exactly.
     #[inline(always)]
-    fn scan(&self, p: usize, cutoff: f64, mut found: impl FnMut(u32, [f64; D], Image)) {
+    fn scan(&self, p: usize, cutoff: f64, mut found: impl FnMut(Neighbor<D>)) {
         let (Some(target), Some(limit)) = (self.placed.targets().get(p), self.placed.limit(cutoff)) else {
             return;
         };
         let center = self.centers.get(p).copied().unwrap_or(u32::MAX);
         let radius = cutoff.min(self.placed.cutoff);
         let rough = within(radius + self.grid.slack);
+        let mut filter = Filter { list: self, target, rough, held: 0, buffer: [0; BUFFER] };
         let mut measure = |slots: &[u32]| {
             for &slot in slots {
                 let Origin { source, image } = self.origins[slot as usize];
-                let separation = if image == Image::OWN {
-                    difference(target, &self.positions[slot as usize])
+                let (separation, sign) = if image == Image::OWN {
+                    (difference(target, &self.positions[slot as usize]), 1)
                 } else {
-                    self.placed.separation(image, target, source as usize)
+                    let separation = self.placed.separation(image, target, source as usize);
+                    (separation, self.placed.domain.sign(image))
                 };
                 if slot != center && distance_squared(&separation) <= limit {
-                    found(source, separation, image);
+                    found(Neighbor { q: source as usize, separation, sign });
                 }
             }
         };
-        let (mut buffer, mut held) = ([0_u32; BUFFER], 0);
         self.table.runs(&self.grid, target, radius, |run| {
             for first in run.clone().step_by(BUFFER / 2) {
-                if held > BUFFER / 2 {
-                    measure(&buffer[..held]);
-                    held = 0;
+                if filter.held > BUFFER / 2 {
+                    measure(&filter.buffer[..filter.held]);
+                    filter.held = 0;
                 }
-                let past = run.end.min(first + BUFFER / 2);
-                for (slot, position) in (first as u32..).zip(&self.positions[first..past]) {
-                    buffer[held % BUFFER] = slot;
-                    held += usize::from(distance_squared(&difference(target, position)) <= rough);
-                }
+                filter.take(first, run.end.min(first + BUFFER / 2));
             }
         });
-        measure(&buffer[..held]);
+        measure(&filter.buffer[..filter.held]);
     }
 }
 
 /// Candidates held before they are measured; a power of two, so that an index is masked, not checked.
 const BUFFER: usize = 128;
+
+/// Slots near enough to be measured.
+struct Filter<'a, const D: usize> {
+    list: &'a CellList<D>,
+    target: &'a [f64; D],
+    rough: f64,
+    held: usize,
+    buffer: [u32; BUFFER],
+}
+
+impl<const D: usize> Filter<'_, D> {
+    /// Keeps the slots from `first` to before `past`, at most half a buffer, that are near enough.
+    #[inline(always)]
+    fn take(&mut self, first: usize, past: usize) {
+        let mut held = self.held;
+        for (slot, position) in (first as u32..).zip(&self.list.positions[first..past]) {
+            self.buffer[held % BUFFER] = slot;
+            held += usize::from(distance_squared(&difference(self.target, position)) <= self.rough);
+        }
+        self.held = held;
+    }
+}
 
 #[inline(always)]
 fn difference<const D: usize>(target: &[f64; D], source: &[f64; D]) -> [f64; D] {
@@ -188,15 +207,19 @@ fn fitting_grid<'a, const D: usize>(
             upper[axis] = point[axis].max(upper[axis]);
         }
     }
-    // Finer cells waste less of a ball; coarser ones need fewer cells where particles are thin.
-    let widths = if D <= 3 { [0.5, 1.0, 2.0] } else { [1.0, 1.0, 2.0] };
-    for width in widths {
-        match Grid::new(lower, upper, width * cutoff, cutoff, magnitude) {
+    // Long runs of cells cost less than small ones waste, and along the last axis cells are cheap; coarser ones where
+    // particles are thin.
+    const LAST: f64 = 0.25;
+    let mut sparse = None;
+    for width in [1.0, 2.0] {
+        let mut widths = [width * cutoff; D];
+        widths[D - 1] = LAST * width * cutoff;
+        match Grid::new(lower, upper, widths, cutoff, magnitude) {
             Ok(grid) if is_dense(grid.total(), count) => return Ok(grid),
-            _ => {}
+            grid => sparse = sparse.or(Some(grid)),
         }
     }
-    Grid::new(lower, upper, cutoff, cutoff, magnitude)
+    sparse.unwrap_or_else(|| Grid::new(lower, upper, [cutoff; D], cutoff, magnitude))
 }
 
 impl<const D: usize> Neighbors<D> for CellList<D> {
@@ -224,22 +247,18 @@ impl<const D: usize> Neighbors<D> for CellList<D> {
         self.placed.generation
     }
 
-    fn for_each(&self, p: usize, cutoff: f64, mut visit: impl FnMut(Neighbor<D>)) {
-        self.scan(p, cutoff, |source, separation, image| {
-            visit(Neighbor { q: source as usize, separation, sign: self.placed.domain.sign(image) });
-        });
+    fn for_each(&self, p: usize, cutoff: f64, visit: impl FnMut(Neighbor<D>)) {
+        self.scan(p, cutoff, visit);
     }
 
     fn gather(&self, p: usize, cutoff: f64, row: &mut Stencil<D>) {
         row.reset(p, self.center(p), cutoff);
-        self.scan(p, cutoff, |source, separation, image| {
-            row.push(Neighbor { q: source as usize, separation, sign: self.placed.domain.sign(image) });
-        });
+        self.scan(p, cutoff, |neighbor| row.push(neighbor));
     }
 
     fn count(&self, p: usize, cutoff: f64) -> usize {
         let mut count = 0;
-        self.scan(p, cutoff, |_, _, _| count += 1);
+        self.scan(p, cutoff, |_| count += 1);
         count
     }
 }

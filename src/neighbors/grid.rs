@@ -2,13 +2,13 @@
 
 use crate::error::{NeighborError, Result};
 
-/// Cell i of an axis holds the coordinates from lower + i * width on. Numbers are monotone in the coordinate whatever
+/// Cell i of an axis holds the coordinates from lower + i * width on (axis by axis). Numbers are monotone in the coordinate whatever
 /// the rounding, so that a range of coordinates is always inside the range of its cells.
 #[derive(Clone, Debug)]
 pub(super) struct Grid<const D: usize> {
     lower: [f64; D],
-    width: f64,
-    inverse: f64,
+    widths: [f64; D],
+    inverses: [f64; D],
     pub(super) counts: [i64; D],
     /// What the search radius is widened by: more than all roundings of ghost positions and cell faces together.
     pub(super) slack: f64,
@@ -20,7 +20,7 @@ const CELLS_HIGH: f64 = (1_u64 << 53) as f64;
 impl<const D: usize> Grid<D> {
     /// Cells of this width over the box from `lower` to `upper` (infinite and reversed for an empty set);
     /// `magnitude` bounds every coordinate that is or will be asked for.
-    pub(super) fn new(lower: [f64; D], upper: [f64; D], width: f64, cutoff: f64, magnitude: f64) -> Result<Self> {
+    pub(super) fn new(lower: [f64; D], upper: [f64; D], widths: [f64; D], cutoff: f64, magnitude: f64) -> Result<Self> {
         let mut counts = [1; D];
         let mut finite = [0.0; D];
         for axis in 0..D {
@@ -28,14 +28,15 @@ impl<const D: usize> Grid<D> {
             if !(extent >= 0.0) {
                 continue;
             }
-            let cells = (extent * (1.0 / width)).floor() + 1.0;
+            let cells = (extent * (1.0 / widths[axis])).floor() + 1.0;
             if !(cells <= CELLS_HIGH) {
                 return Err(NeighborError::Cells { axis, cells, limit: CELLS_HIGH }.into());
             }
             counts[axis] = cells as i64;
             finite[axis] = lower[axis];
         }
-        Ok(Self { lower: finite, width, inverse: 1.0 / width, counts, slack: Self::slack(magnitude, cutoff) })
+        let inverses = widths.map(|width| 1.0 / width);
+        Ok(Self { lower: finite, widths, inverses, counts, slack: Self::slack(magnitude, cutoff) })
     }
 
     /// What all roundings together can hide at most.
@@ -53,7 +54,7 @@ impl<const D: usize> Grid<D> {
     #[inline(always)]
     pub(super) fn number(&self, axis: usize, coordinate: f64) -> i64 {
         // The cast saturates, so that any coordinate ends in the nearest cell.
-        (((coordinate - self.lower[axis]) * self.inverse) as i64).clamp(0, self.counts[axis] - 1)
+        (((coordinate - self.lower[axis]) * self.inverses[axis]) as i64).clamp(0, self.counts[axis] - 1)
     }
 
     #[inline(always)]
@@ -65,8 +66,8 @@ impl<const D: usize> Grid<D> {
     #[inline(always)]
     fn gap_squared(&self, axis: usize, cell: i64, coordinate: f64) -> f64 {
         // An edge cell also holds what the clamp put there, but nothing outside the bounding box exists.
-        let from = self.lower[axis] + cell as f64 * self.width;
-        let gap = (from - coordinate).max(coordinate - (from + self.width)) - self.slack;
+        let from = self.lower[axis] + cell as f64 * self.widths[axis];
+        let gap = (from - coordinate).max(coordinate - (from + self.widths[axis])) - self.slack;
         let gap = gap.max(0.0);
         gap * gap
     }
@@ -86,23 +87,28 @@ impl<const D: usize> Grid<D> {
         let limit = reach * reach;
         let low: [i64; D] = std::array::from_fn(|axis| self.number(axis, point[axis] - reach));
         let high: [i64; D] = std::array::from_fn(|axis| self.number(axis, point[axis] + reach));
-        let mut gaps: [f64; D] =
-            std::array::from_fn(|axis| if axis + 1 < D { self.gap_squared(axis, low[axis], point[axis]) } else { 0.0 });
         let mut cell = low;
-        'runs: loop {
-            if gaps.iter().sum::<f64>() <= limit {
-                visit(&cell, high[D - 1]);
+        if D == 1 {
+            return visit(&cell, high[0]);
+        }
+        // All axes but the last two turn like an odometer; the last but one is a plain loop, where the time goes.
+        let (outer, inner) = (D - 2, D - 2);
+        loop {
+            let mut gap = 0.0;
+            for axis in 0..outer {
+                gap += self.gap_squared(axis, cell[axis], point[axis]);
             }
-            for axis in (0..D - 1).rev() {
-                if cell[axis] < high[axis] {
-                    cell[axis] += 1;
-                    gaps[axis] = self.gap_squared(axis, cell[axis], point[axis]);
-                    continue 'runs;
+            for number in low[inner]..=high[inner] {
+                if gap + self.gap_squared(inner, number, point[inner]) <= limit {
+                    cell[inner] = number;
+                    visit(&cell, high[D - 1]);
                 }
-                cell[axis] = low[axis];
-                gaps[axis] = self.gap_squared(axis, cell[axis], point[axis]);
             }
-            return;
+            let Some(axis) = (0..outer).rev().find(|&axis| cell[axis] < high[axis]) else {
+                return;
+            };
+            cell[axis] += 1;
+            cell[axis + 1..outer].copy_from_slice(&low[axis + 1..outer]);
         }
     }
 }

@@ -1,9 +1,11 @@
 //! Stored rows: those of another provider, or the user's own after every check.
 
 use super::Neighbors;
-use super::placed::{Placed, check_cutoff, distance_squared, within};
+use super::block::Block;
+use super::placed::{Placed, check_cutoff, distance_squared};
+use super::row_check::{check_offsets, check_row};
 use crate::domain::{Domain, Image};
-use crate::error::{Error, NeighborError, ParticleError, Result};
+use crate::error::{Error, NeighborError, Result};
 use crate::particles::{PARTICLES_HIGH, Particles, check_count, reserved};
 use crate::scale::Cutoff;
 use crate::stencil::{Neighbor, Stencil};
@@ -26,49 +28,27 @@ pub struct NeighborList<const D: usize> {
     owned: usize,
     /// `NONE` where a target is no particle.
     centers: Vec<u32>,
-    /// One cutoff per target, or a single one.
     cutoffs: Vec<f64>,
     reach: f64,
     generation: u64,
-    offsets: Vec<usize>,
-    neighbors: Vec<u32>,
-    separations: Vec<[f64; D]>,
-    signs: Vec<i8>,
+    blocks: Vec<Block<D>>,
 }
 
 const NONE: u32 = u32::MAX;
 
 impl<const D: usize> NeighborList<D> {
-    /// The rows of another provider, up to its reach. Every row is searched twice, first to count, so that nothing
-    /// is allocated twice.
+    /// The rows of another provider, up to its reach. Every row is searched once and stored without spare room.
     ///
     /// # Errors
-    /// [`NeighborError::Offsets`] naming a target for which the provider gathers more or fewer than it counts,
-    /// [`ParticleError::TooMany`], [`ParticleError::Memory`] where the list does not fit.
+    /// [`ParticleError::TooMany`](crate::ParticleError::TooMany), [`ParticleError::Memory`](crate::ParticleError::Memory) where the list does not fit.
     pub fn from_provider(provider: &impl Neighbors<D>) -> Result<Self> {
         let (targets, reach) = (provider.targets(), provider.reach());
-        let mut offsets = reserved(targets + 1)?;
-        let mut total = 0;
-        offsets.push(0);
-        for p in 0..targets {
-            total += provider.count(p, reach);
-            offsets.push(total);
-        }
-        let mut list = Self::with_offsets(provider.sources(), offsets, reach, provider.generation())?;
+        let mut list = Self::with_room(targets, provider.sources(), reach, provider.generation())?;
         list.owned = provider.owned();
-        let mut row = Stencil::default();
+        let mut block = Block::empty();
         for p in 0..targets {
-            provider.gather(p, reach, &mut row);
-            list.neighbors.extend_from_slice(row.sources());
-            list.separations.extend_from_slice(row.separations());
-            list.signs.extend_from_slice(row.signs());
-            let needed = list.offsets[p + 1];
-            if list.neighbors.len() != needed {
-                let found = list.neighbors.len();
-                return Err(Error::from(NeighborError::Offsets { row: p, found, needed }).at(p));
-            }
-            list.centers.push(provider.center(p).map_or(NONE, |q| q as u32));
-            list.cutoffs.push(provider.cutoff(p));
+            provider.for_each(p, reach, |neighbor| block.push(neighbor));
+            list.end_row(p + 1 == targets, &mut block, provider.center(p), provider.cutoff(p))?;
         }
         Ok(list)
     }
@@ -88,8 +68,8 @@ impl<const D: usize> NeighborList<D> {
     /// [`NeighborError::Distance`] for a neighbor beyond the cutoff,
     /// [`NeighborError::OwnCenter`] for the target itself (source and zero separation),
     /// [`NeighborError::Repeated`] for the same image twice,
-    /// [`ParticleError::Length`] where there is not one offset more than centers,
-    /// [`ParticleError::TooMany`], [`ParticleError::Memory`] where the list does not fit.
+    /// [`ParticleError::Length`](crate::ParticleError::Length) where there is not one offset more than centers,
+    /// [`ParticleError::TooMany`](crate::ParticleError::TooMany), [`ParticleError::Memory`](crate::ParticleError::Memory) where the list does not fit.
     pub fn from_rows(
         sources: usize,
         centers: &[Option<usize>],
@@ -100,22 +80,16 @@ impl<const D: usize> NeighborList<D> {
     ) -> Result<Self> {
         check_cutoff(cutoff)?;
         check_offsets(offsets, centers.len(), neighbors.len())?;
-        let mut own_offsets = reserved(offsets.len())?;
-        own_offsets.extend_from_slice(offsets);
-        let mut list = Self::with_offsets(sources, own_offsets, cutoff.0, generation)?;
+        let mut list = Self::with_room(centers.len(), sources, cutoff.0, generation)?;
+        let mut block = Block::empty();
         for (p, &center) in centers.iter().enumerate() {
             let row = &neighbors[offsets[p]..offsets[p + 1]];
             if let Some(q) = center.filter(|&q| q >= sources) {
                 return Err(Error::from(NeighborError::Source { q, sources }).at(p));
             }
             check_row(sources, center, row, cutoff.0).map_err(|error| error.at(p))?;
-            list.centers.push(center.map_or(NONE, |q| q as u32));
-            list.cutoffs.push(cutoff.0);
-            for neighbor in row {
-                list.neighbors.push(neighbor.q as u32);
-                list.separations.push(neighbor.separation);
-                list.signs.push(neighbor.sign);
-            }
+            row.iter().for_each(|&neighbor| block.push(neighbor));
+            list.end_row(p + 1 == centers.len(), &mut block, center, cutoff.0)?;
         }
         Ok(list)
     }
@@ -162,82 +136,31 @@ impl<const D: usize> NeighborList<D> {
 
     /// How many neighbors all rows hold together.
     pub fn total(&self) -> usize {
-        self.neighbors.len()
+        self.blocks.iter().map(Block::total).sum()
     }
 
-    fn with_offsets(sources: usize, offsets: Vec<usize>, reach: f64, generation: u64) -> Result<Self> {
+    fn with_room(targets: usize, sources: usize, reach: f64, generation: u64) -> Result<Self> {
         check_count(sources, PARTICLES_HIGH)?;
-        let (targets, total) = (offsets.len().saturating_sub(1), offsets.last().copied().unwrap_or(0));
-        Ok(Self {
-            sources,
-            owned: sources,
-            centers: reserved(targets)?,
-            cutoffs: reserved(targets)?,
-            reach,
-            generation,
-            offsets,
-            neighbors: reserved(total)?,
-            separations: reserved(total)?,
-            signs: reserved(total)?,
-        })
+        let (centers, cutoffs) = (reserved(targets)?, reserved(targets)?);
+        let blocks = reserved(targets.div_ceil(Block::<D>::ROWS))?;
+        Ok(Self { sources, owned: sources, centers, cutoffs, reach, generation, blocks })
+    }
+
+    fn end_row(&mut self, last: bool, block: &mut Block<D>, center: Option<usize>, cutoff: f64) -> Result<()> {
+        self.centers.push(center.map_or(NONE, |q| q as u32));
+        self.cutoffs.push(cutoff);
+        block.end_row();
+        if last || block.is_full() {
+            self.blocks.push(block.pack()?);
+        }
+        Ok(())
     }
 
     #[inline(always)]
     fn within(&self, p: usize, cutoff: f64) -> impl Iterator<Item = Neighbor<D>> + '_ {
-        let range = match self.offsets.get(p..).and_then(|rest| rest.first_chunk::<2>()) {
-            Some(&[first, past]) if cutoff >= 0.0 => first..past,
-            _ => 0..0,
-        };
-        let whole = cutoff >= self.reach;
-        let limit = within(cutoff);
-        let row = self.neighbors[range.clone()].iter().zip(&self.separations[range.clone()]).zip(&self.signs[range]);
-        row.filter(move |((_, separation), _)| whole || distance_squared(separation) <= limit)
-            .map(|((&q, &separation), &sign)| Neighbor { q: q as usize, separation, sign })
-    }
-}
-
-fn check_offsets(offsets: &[usize], targets: usize, neighbors: usize) -> Result<()> {
-    if Some(offsets.len()) != targets.checked_add(1) {
-        return Err(ParticleError::Length { found: offsets.len(), needed: targets.saturating_add(1) }.into());
-    }
-    let mut least = 0;
-    for (row, &found) in offsets.iter().enumerate() {
-        if found < least || (row == 0 && found != 0) {
-            return Err(Error::from(NeighborError::Offsets { row, found, needed: least }).at(row));
-        }
-        if row == targets && found != neighbors {
-            return Err(NeighborError::Offsets { row, found, needed: neighbors }.into());
-        }
-        least = found;
-    }
-    Ok(())
-}
-
-fn check_row<const D: usize>(sources: usize, center: Option<usize>, row: &[Neighbor<D>], cutoff: f64) -> Result<()> {
-    for &Neighbor { q, separation, sign } in row {
-        if q >= sources {
-            return Err(NeighborError::Source { q, sources }.into());
-        }
-        if let Some(axis) = (0..D).find(|&axis| !separation[axis].is_finite()) {
-            return Err(NeighborError::Separation { q, axis, separation: separation[axis] }.into());
-        }
-        if sign != 1 && sign != -1 {
-            return Err(NeighborError::Sign { q, sign }.into());
-        }
-        let squared = distance_squared(&separation);
-        if !(squared <= within(cutoff)) {
-            return Err(NeighborError::Distance { q, distance: squared.sqrt(), cutoff }.into());
-        }
-        if center == Some(q) && sign == 1 && separation == [0.0; D] {
-            return Err(NeighborError::OwnCenter { q }.into());
-        }
-    }
-    // Adding zero makes -0 and +0 one place.
-    let mut images: Vec<_> = row.iter().map(|n| (n.q, n.separation.map(|s| (s + 0.0).to_bits()), n.sign)).collect();
-    images.sort_unstable();
-    match images.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(pair) => Err(NeighborError::Repeated { q: pair[0].0 }.into()),
-        None => Ok(()),
+        let rows = Block::<D>::ROWS;
+        let block = self.blocks.get(p / rows).filter(|_| cutoff >= 0.0);
+        block.into_iter().flat_map(move |block| block.row(p % rows, cutoff, cutoff >= self.reach))
     }
 }
 

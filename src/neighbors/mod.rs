@@ -1,5 +1,6 @@
 //! Neighbor providers: who lies within the cutoff of whom.
 
+mod block;
 mod brute_force;
 mod canonical;
 mod cell_list;
@@ -8,6 +9,7 @@ mod list;
 mod measure;
 mod order;
 mod placed;
+mod row_check;
 mod table;
 
 pub use brute_force::BruteForce;
