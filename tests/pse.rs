@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 use parops::{
     Allowance, Apply, BruteForce, CellList, Cutoff, D2, Domain, Epsilon, ErrorKind, Exchange, Expression, Face, Form,
     Gradient, Laplacian, MultiIndex, NeighborError, Neighbors, OperatorError, Particles, Pse, Random, Rows, Sign,
@@ -101,7 +102,7 @@ fn wide_gaussian_has_the_leading_error_of_its_fourth_moment() {
     let p = n / 5;
     let error = out[p] + TAU * TAU * f[p];
     let predicted = 0.5 * epsilon * epsilon * TAU.powi(4) * f[p];
-    assert!((error / predicted - 1.0).abs() < 0.02, "{error} against {predicted}");
+    assert_relative_eq!(error, predicted, max_relative = 0.02);
 }
 
 #[test]
@@ -282,7 +283,7 @@ fn gradient_divergence_and_velocity_contract_one_set_of_rows() -> Failure {
     let scale = 8.0 * round_off(rows.report().most) * rows.report().sum_abs;
     for p in 0..n {
         let expected = velocity[p][0] * x[p] + velocity[p][1] * y[p];
-        assert!((along[p] - expected).abs() <= scale);
+        assert_abs_diff_eq!(along[p], expected, epsilon = scale);
         let exact = -2.0 * TAU * TAU * wave(&particles.points()[p]);
         assert!((divergence[p] - exact).abs() < 0.02 * 2.0 * TAU * TAU);
     }
@@ -453,13 +454,13 @@ fn spectral_bound_is_the_one_of_errata_26_for_positive_definite_kernels() -> Fai
     let h = 1.0 / 32.0;
     let wide = Pse::with_kernels([WideGaussian::<2>::new()], Epsilon::global(h)?, particles.volumes()?)?;
     let rows = wide.assemble(&CellList::build(&particles, &unit_torus(), wide.cutoff())?)?;
-    assert!((rows.report().spectral_bound * h * h - 1.0).abs() < 1e-6);
+    assert_relative_eq!(rows.report().spectral_bound * h * h, 1.0, max_relative = 1e-6);
     for order in [2, 4, 6, 8] {
         let epsilon = 2.0 * h;
         let narrow = Pse::new(Laplacian::<2>, order, Epsilon::global(epsilon)?, particles.volumes()?)?;
         let rows = narrow.assemble(&CellList::build(&particles, &unit_torus(), narrow.cutoff())?)?;
         let bound = rows.report().spectral_bound * epsilon * epsilon;
-        assert!((bound - 2.0 * f64::from(order)).abs() < 1e-9, "order {order}: {bound}");
+        assert_relative_eq!(bound, 2.0 * f64::from(order), max_relative = 1e-9);
     }
     // A gradient has no such bound: twice the sum of absolute weights (Gershgorin).
     let gradient = Pse::new(D2::<1, 0>::default(), 4, Epsilon::global(2.0 * h)?, particles.volumes()?)?;

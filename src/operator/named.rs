@@ -1,12 +1,13 @@
 //! The operators that have a name: Laplacian, gradient, divergence, derivative along a velocity.
 
 use std::fmt;
+use std::ops::{Add, Mul, Neg, Sub};
 
 use typenum::{U1, U2};
 
 use super::expression::{Operator, ShowSum};
-use super::typed::Homogeneous;
-use crate::multi_index::MultiIndex;
+use super::typed::{Homogeneous, Plus, Times, arithmetic, shown};
+use crate::multi_index::{MultiIndex, SameDegree};
 
 /// The Laplacian sum_i d^2/dx_i^2, one weight per pair.
 #[derive(Clone, Copy, Default)]
@@ -83,4 +84,16 @@ impl<const D: usize> Operator<D> for Along<D> {
 /// The pure derivatives of this degree, axis by axis.
 fn along_axes<const D: usize>(degree: u8) -> impl Iterator<Item = MultiIndex<D>> {
     (0..D).map(move |axis| MultiIndex::new(std::array::from_fn(|i| if i == axis { degree } else { 0 })))
+}
+
+arithmetic! {
+    [const D: usize] Laplacian<D> [];
+    [const D: usize] Gradient<D> [];
+    [const D: usize] Along<D> [];
+}
+
+shown! {
+    [const D: usize] Laplacian<D> [];
+    [const D: usize] Gradient<D> [];
+    [const D: usize] Along<D> [];
 }

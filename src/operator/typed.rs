@@ -6,7 +6,6 @@ use std::ops::{Add, Mul, Neg, Sub};
 use typenum::Unsigned;
 
 use super::expression::{Operator, ShowSum};
-use super::named::{Along, Gradient, Laplacian};
 use crate::multi_index::{Beta, Exponents, HasLen, MultiIndex, SameDegree};
 
 /// A typed expression whose terms all have one degree, known to the compiler.
@@ -53,7 +52,7 @@ impl<L: HasLen<D>, const D: usize> Operator<D> for Beta<L> {
 /// assert_eq!(sum.to_string(), "D^(2,0) + D^(0,2)");
 /// ```
 #[derive(Clone, Copy, Default)]
-pub struct Plus<A: Homogeneous, B: Homogeneous>(A, B)
+pub struct Plus<A: Homogeneous, B: Homogeneous>(pub(super) A, pub(super) B)
 where
     A::Degree: SameDegree<B::Degree>;
 
@@ -85,7 +84,7 @@ where
 
 /// An operator times a constant factor.
 #[derive(Clone, Copy)]
-pub struct Times<A>(f64, A);
+pub struct Times<A>(pub(super) f64, pub(super) A);
 
 impl<A: Homogeneous> Homogeneous for Times<A> {
     type Degree = A::Degree;
@@ -154,9 +153,6 @@ arithmetic! {
     [L: Exponents] Beta<L> [];
     [A: Homogeneous, B: Homogeneous] Plus<A, B> [A::Degree: SameDegree<B::Degree>];
     [A: Homogeneous] Times<A> [];
-    [const D: usize] Laplacian<D> [];
-    [const D: usize] Gradient<D> [];
-    [const D: usize] Along<D> [];
 }
 
 // `Beta` writes itself: it stands in the layer above.
@@ -179,7 +175,6 @@ macro_rules! shown {
 shown! {
     [A: Homogeneous, B: Homogeneous] Plus<A, B> [A::Degree: SameDegree<B::Degree>];
     [A: Homogeneous] Times<A> [];
-    [const D: usize] Laplacian<D> [];
-    [const D: usize] Gradient<D> [];
-    [const D: usize] Along<D> [];
 }
+
+pub(super) use {arithmetic, shown};
