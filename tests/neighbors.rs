@@ -210,6 +210,11 @@ fn outliers_at_twelve_magnitudes_keep_the_rows_and_the_memory() {
     let oracle = BruteForce::build(&particles, &Domain::open(), cutoff).unwrap();
     assert_same_rows(&oracle, &cells, cutoff.0);
     assert_eq!(cells.count(512, cutoff.0), 1);
+    // A target so far away that the slack of its rounding spans very many cells.
+    let targets = [[1e40, 0.0, 0.0], [0.5, 0.5, 0.5]];
+    let cells = CellList::build_at(&targets, &particles, &Domain::open(), cutoff).unwrap();
+    let oracle = BruteForce::build_at(&targets, &particles, &Domain::open(), cutoff).unwrap();
+    assert_same_rows(&oracle, &cells, cutoff.0);
 }
 
 #[test]
