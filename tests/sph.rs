@@ -150,7 +150,7 @@ fn derivatives_of_every_degree_converge_with_the_order_of_the_kernel_on_lattices
     // Errata 9: r, not r - |beta|. The finest pair whose error is above the round-off of 1/epsilon^m.
     let targets = anywhere(60);
     for choice in Choice::all() {
-        let n = 32;
+        let n = 36;
         for beta in DERIVATIVES {
             let mut forms = vec![(SphForm::Summation, false)];
             if beta == [1, 0] || beta == [2, 0] {
