@@ -153,8 +153,10 @@ fn derivatives_of_every_degree_converge_with_the_order_of_the_kernel_on_lattices
         let n = 36;
         for beta in DERIVATIVES {
             let mut forms = vec![(SphForm::Summation, false)];
-            if beta == [1, 0] || beta == [2, 0] {
-                forms.extend([(SphForm::Summation, true), (SphForm::Difference, true)]);
+            match beta {
+                [1, 0] => forms.push((SphForm::Summation, true)),
+                [2, 0] => forms.push((SphForm::Difference, true)),
+                _ => {}
             }
             for (form, at_particles) in forms {
                 let error = |n: usize| {

@@ -3,6 +3,8 @@
 //! Each returns the first promise that is broken, with the numbers.
 
 mod kernel;
+mod method;
+mod method_fault;
 mod provider;
 mod sample;
 mod smoothing;
@@ -10,6 +12,8 @@ mod stepper;
 mod stepper_fault;
 
 pub use kernel::{KernelFault, KernelLimits, check_kernel};
+pub use method::{check_method, check_method_moments};
+pub use method_fault::MethodFault;
 pub use provider::{ProviderFault, check_provider, check_provider_against};
 pub use smoothing::check_smoothing_kernel;
 pub use stepper::{StepperReport, check_stepper};
