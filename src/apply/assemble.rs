@@ -3,10 +3,10 @@
 use super::blocks::{BLOCK, each_block};
 use super::rows::{Centers, Rows};
 use super::{Field, MatrixFree, Report};
-use crate::error::{Error, NeighborError, Result};
+use crate::error::{Error, NeighborError, OperatorError, Result};
 use crate::kernel::{Kernel, SmoothingKernel};
 use crate::neighbors::Neighbors;
-use crate::operator::{Method, Outputs, Pse, Sph};
+use crate::operator::{Method, Outputs, Pse, RowReport, Sph};
 use crate::stencil::Stencil;
 
 impl<S: Outputs, T: Field> Rows<S, T> {
@@ -18,9 +18,8 @@ impl<S: Outputs, T: Field> Rows<S, T> {
     /// # Errors
     /// [`NeighborError::Reach`] naming the target whose cutoff is beyond the provider; [`NeighborError::Source`] and
     /// [`NeighborError::Offsets`] for a provider that names sources it does not have or counts others than it gathers;
-    /// what the method refuses; and
-    /// [`OperatorError::Overlap`](crate::OperatorError::Overlap) or
-    /// [`OperatorError::Moment`](crate::OperatorError::Moment) naming the worst row that breaks a limit without leave.
+    /// what the method refuses; [`OperatorError::Weight`] where a weight is not finite, in `f64` or rounded to `T`; and
+    /// [`OperatorError::Overlap`] or [`OperatorError::Moment`] naming the worst row that breaks a limit without leave.
     pub fn assemble<const D: usize, M: Method<D, Out = S>, P: Neighbors<D>>(method: &M, neighbors: &P) -> Result<Self> {
         let targets = neighbors.targets();
         let offsets = count(method, neighbors)?;
@@ -49,11 +48,13 @@ impl<S: Outputs, T: Field> Rows<S, T> {
                     return Err(Error::from(NeighborError::Offsets { row: p, found, needed }).at(p));
                 }
                 block.columns[range.clone()].copy_from_slice(worker.row.sources());
-                for (stored, w) in block.weights[range].iter_mut().zip(&worker.weights) {
+                report.add(&worker.report(method, p)?);
+                for (stored, w) in block.weights[range.clone()].iter_mut().zip(&worker.weights) {
                     *stored = w.map(T::lift);
                 }
                 *diagonal = worker.diagonal.map(T::lift);
-                report.add(&worker.report(method, p)?);
+                let weights = block.weights[range].iter().map(AsRef::as_ref);
+                finite(&worker.row, weights, diagonal.as_ref()).map_err(|error| error.at(p))?;
             }
             Ok(report)
         })?;
@@ -64,7 +65,22 @@ impl<S: Outputs, T: Field> Rows<S, T> {
             diagonal = Vec::new();
         }
         let (sources, generation) = (neighbors.sources(), neighbors.generation());
-        Ok(Self { offsets, columns, weights, diagonal, centers: centers(neighbors), sources, generation, report })
+        Ok(Self { offsets, columns, weights, diagonal, centers: centers(neighbors)?, sources, generation, report })
+    }
+}
+
+/// Refuses weights that are not finite: those of a method, or those that a shorter type cannot hold.
+fn finite<'a, const D: usize, T: Field>(
+    row: &Stencil<D>,
+    weights: impl Iterator<Item = &'a [T]>,
+    diagonal: &[T],
+) -> Result<()> {
+    let bad = |w: &[T]| -> Option<f64> { w.iter().find(|w| !w.is_finite()).map(|w| w.as_()) };
+    let pair = row.sources().iter().zip(weights).find_map(|(&q, w)| Some((q as usize, bad(w)?)));
+    let own = || Some((row.center().unwrap_or(row.target()), bad(diagonal)?));
+    match pair.or_else(own) {
+        Some((q, weight)) => Err(OperatorError::Weight { q, weight }.into()),
+        None => Ok(()),
     }
 }
 
@@ -94,12 +110,15 @@ fn count<const D: usize, M: Method<D>, P: Neighbors<D>>(method: &M, neighbors: &
     Ok(offsets)
 }
 
-fn centers<const D: usize, P: Neighbors<D>>(neighbors: &P) -> Centers {
-    let targets = 0..neighbors.targets();
+fn centers<const D: usize, P: Neighbors<D>>(neighbors: &P) -> Result<Centers> {
+    let (targets, sources) = (0..neighbors.targets(), neighbors.sources());
+    if let Some((p, q)) = targets.clone().find_map(|p| Some((p, neighbors.center(p).filter(|&q| q >= sources)?))) {
+        return Err(Error::from(NeighborError::Source { q, sources }).at(p));
+    }
     if targets.clone().all(|p| neighbors.center(p) == Some(p)) {
-        Centers::Same
+        Ok(Centers::Same)
     } else {
-        Centers::Each(targets.map(|p| neighbors.center(p).map(|q| q as u32)).collect())
+        Ok(Centers::Each(targets.map(|p| neighbors.center(p).map(|q| q as u32)).collect()))
     }
 }
 
@@ -131,10 +150,14 @@ impl<const D: usize, M: Method<D>> Worker<D, M> {
         filled.map_err(|error| error.at(p))
     }
 
-    /// What is known of the row just filled.
-    pub(super) fn report(&self, method: &M, p: usize) -> Result<crate::operator::RowReport> {
-        let report = method.report(&self.row, &self.scratch, &self.weights, &self.diagonal);
-        report.map_err(|error| error.at(p))
+    /// What is known of the row just filled, once it is known to be finite.
+    pub(super) fn report(&self, method: &M, p: usize) -> Result<RowReport> {
+        let known = || {
+            let weights = self.weights.iter().map(Outputs::as_slice);
+            finite(&self.row, weights, self.diagonal.as_slice())?;
+            method.report(&self.row, &self.scratch, &self.weights, &self.diagonal)
+        };
+        known().map_err(|error: Error| error.at(p))
     }
 }
 

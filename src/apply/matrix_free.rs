@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use super::assemble::Worker;
 use super::blocks::{BLOCK, each_block};
-use super::{Apply, Field, Report, check};
+use super::{Apply, Field, Report, check, check_results};
 use crate::error::Result;
 use crate::neighbors::Neighbors;
 use crate::operator::Method;
@@ -85,7 +85,7 @@ where
                 Ok(())
             })
         })?;
-        Ok(())
+        check_results(out.as_chunks::<1>().0)
     }
 }
 

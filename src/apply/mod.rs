@@ -35,7 +35,8 @@ pub trait Apply<T: Field>: Sync {
     ///
     /// # Errors
     /// [`ApplyError::Input`] and [`ApplyError::Output`] for wrong lengths; [`ApplyError::Field`] naming the first
-    /// particle whose value is not finite. `out` is written only where all of that holds.
+    /// particle whose value is not finite; `out` is then as it was. [`ApplyError::Overflow`] naming the first target
+    /// whose result is not finite.
     fn apply(&self, f: &[T], out: &mut [T]) -> Result<()>;
 }
 
@@ -50,6 +51,15 @@ fn check<T: Field, In: AsRef<[T]>, Out>(f: &[In], sources: usize, out: &[Out], t
     let bad = |values: &In| values.as_ref().iter().copied().find(|x| !x.is_finite());
     match f.iter().enumerate().find_map(|(p, values)| bad(values).map(|x| (p, x))) {
         Some((p, value)) => Err(Error::from(ApplyError::Field { value: value.as_() }).at(p)),
+        None => Ok(()),
+    }
+}
+
+/// Refuses results that are not finite, which a finite field and finite weights give only by overflow.
+fn check_results<T: Field, Out: AsRef<[T]>>(out: &[Out]) -> Result<()> {
+    let bad = |values: &Out| values.as_ref().iter().copied().find(|x| !x.is_finite());
+    match out.iter().enumerate().find_map(|(p, values)| bad(values).map(|x| (p, x))) {
+        Some((p, value)) => Err(Error::from(ApplyError::Overflow { value: value.as_() }).at(p)),
         None => Ok(()),
     }
 }

@@ -63,17 +63,17 @@ impl Report {
     }
 
     fn extremes(&mut self, h_over_epsilon: f64, moment_defect: f64, sum_abs: f64, spectral_bound: f64) {
-        self.h_over_epsilon = self.h_over_epsilon.max(h_over_epsilon);
-        self.moment_defect = self.moment_defect.max(moment_defect);
-        self.sum_abs = self.sum_abs.max(sum_abs);
-        self.spectral_bound = self.spectral_bound.max(spectral_bound);
+        self.h_over_epsilon = worse(self.h_over_epsilon, h_over_epsilon);
+        self.moment_defect = worse(self.moment_defect, moment_defect);
+        self.sum_abs = worse(self.sum_abs, sum_abs);
+        self.spectral_bound = worse(self.spectral_bound, spectral_bound);
     }
 
     /// A breach without leave outranks one with leave, which outranks none; of equals the first row stays.
     fn rank(&mut self, row: &RowReport) {
         let key = |row: &RowReport| {
             let refused = row.breach.is_some() && !row.allowed;
-            (refused, row.severity(), row.moment_defect)
+            (refused, row.severity(), if row.moment_defect.is_nan() { f64::INFINITY } else { row.moment_defect })
         };
         let worse = match &self.worst {
             None => true,
@@ -91,4 +91,9 @@ impl Report {
             _ => Ok(()),
         }
     }
+}
+
+/// The larger of two figures, NaN being the largest of all: a method that knows nothing must not look perfect.
+fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
 }

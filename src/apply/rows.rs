@@ -1,7 +1,7 @@
 //! Stored rows: the weights of any method, for any number of applications.
 
 use super::blocks::each_row;
-use super::{Apply, Field, Report, check};
+use super::{Apply, Field, Report, check, check_results};
 use crate::error::{ApplyError, Result};
 use crate::operator::Outputs;
 
@@ -140,7 +140,7 @@ impl<const K: usize, T: Field> Rows<[f64; K], T> {
             });
             sum
         });
-        Ok(())
+        check_results(out)
     }
 
     /// The contraction with a vector field, `out[p]` = sum_k (L_k f_k)_p: the divergence, for gradient rows.
@@ -163,7 +163,7 @@ impl<const K: usize, T: Field> Rows<[f64; K], T> {
             });
             sum
         });
-        Ok(())
+        check_results(scalars(out))
     }
 
     /// The derivative along a vector per target, `out[p]` = sum_k v_k(p) (L_k f)_p: v . grad f, for gradient rows.
@@ -183,7 +183,7 @@ impl<const K: usize, T: Field> Rows<[f64; K], T> {
             self.gather(p, f, |w, fq, fp| sum += along(w) * fp.map_or(fq, |fp| fq - fp));
             sum
         });
-        Ok(())
+        check_results(scalars(out))
     }
 }
 

@@ -441,6 +441,11 @@ kinds! {
             /// Generation of the set.
             set: u64,
         } => "the rows were built for generation {rows} of the particles, not for {set}",
+        /// A result that is not finite, although field and weights are.
+        Overflow {
+            /// The result.
+            value: f64,
+        } => "the result is {value} here: it overflows",
     }
 }
 

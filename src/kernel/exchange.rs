@@ -171,7 +171,9 @@ impl<const D: usize> Piece<D> {
 /// sum_k c_k s^k.
 #[inline(always)]
 pub(super) fn horner<T: Scalar>(coefficients: &[f64], s: T) -> T {
-    coefficients.iter().rev().fold(T::zero(), |sum, &c| sum * s + T::lift(c))
+    // Begun with the last coefficient, a constant stays one where s overflows.
+    let Some((&last, others)) = coefficients.split_last() else { return T::zero() };
+    others.iter().rev().fold(T::lift(last), |sum, &c| sum * s + T::lift(c))
 }
 
 impl<T: Scalar, const D: usize> Kernel<T, D> for Exchange<D> {

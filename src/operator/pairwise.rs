@@ -135,7 +135,9 @@ impl<K, const N: usize> Pairwise<K, N> {
         let kernel = &self.kernels[n];
         let moment = |beta: MultiIndex<D>| -> f64 {
             let pairs = scratch.z.iter().zip(&scratch.volume).enumerate();
-            pairs.map(|(i, (z, volume))| volume * scratch.eta[i * N + n] * beta.power(z)).sum()
+            // Where the kernel underflows z^beta may overflow: zero times infinity must not enter.
+            let weights = pairs.map(|(i, (z, volume))| (z, volume * scratch.eta[i * N + n]));
+            weights.filter(|&(_, weight)| weight != 0.0).map(|(z, weight)| weight * beta.power(z)).sum()
         };
         let (mut defect, mut largest) = (0.0_f64, 0.0_f64);
         if self.degree > 0 {
@@ -256,7 +258,7 @@ impl<K, const N: usize> Pairwise<K, N> {
                 *own = if row.center().is_some() { *own + self.own(kernel, row)? * scale } else { 0.0 };
             }
         }
-        finite(row, w)
+        finite(row, w, diagonal)
     }
 
     /// What is known of the row just written, see [`Method::report`](super::Method::report).
@@ -318,10 +320,12 @@ fn positive(value: f64) -> Result<f64> {
     if value > 0.0 && value.is_finite() { Ok(value) } else { Err(OperatorError::Setting { value }.into()) }
 }
 
-fn finite<const D: usize, const N: usize>(row: &Stencil<D>, w: &[[f64; N]]) -> Result<()> {
-    for (i, weights) in w.iter().enumerate() {
+fn finite<const D: usize, const N: usize>(row: &Stencil<D>, w: &[[f64; N]], diagonal: &[f64; N]) -> Result<()> {
+    let own = (row.center().unwrap_or(row.target()), diagonal);
+    let pairs = row.sources().iter().map(|&q| q as usize).zip(w);
+    for (q, weights) in pairs.chain([own]) {
         if let Some(&weight) = weights.iter().find(|weight| !weight.is_finite()) {
-            return Err(OperatorError::Weight { q: row.sources()[i] as usize, weight }.into());
+            return Err(OperatorError::Weight { q, weight }.into());
         }
     }
     Ok(())
