@@ -52,7 +52,8 @@ pub use kernel::{
     ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Rational, SmoothingKernel, WideGaussian,
 };
 pub use moment::{
-    CenterTerm, Quadrature, continuous_moment, continuous_moments, discrete_moment, discrete_moments,
+    CenterTerm, Cholesky, Ladder, Lu, MomentScratch, MomentSolver, MomentSystem, PivotedQr, Qr, Quadrature, Residual,
+    Rung, Solution, Window, continuous_moment, continuous_moments, discrete_moment, discrete_moments,
     moment_conditions, required_moment,
 };
 pub use multi_index::*;

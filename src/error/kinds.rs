@@ -392,6 +392,15 @@ kinds! {
             /// The weight.
             weight: f64,
         } => "the weight of neighbor {q} is {weight}",
+        /// A moment system without a solution.
+        Singular {
+            /// Number of neighbors n.
+            neighbors: usize,
+            /// Number of conditions l.
+            conditions: usize,
+            /// Rank of the conditions on this stencil.
+            rank: usize,
+        } => "the {neighbors} neighbors give the {conditions} moment conditions rank {rank} only",
         /// The '+' sign asked for an even degree.
         PlusEven {
             /// The degree.

@@ -1,0 +1,102 @@
+//! The seam of the solvers of moment systems.
+
+use super::system::{MomentSystem, Residual};
+use crate::error::Result;
+use crate::scalar::Scalar;
+
+/// Which method found the weights of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Rung {
+    /// LU of A = B^T B, as in the notes.
+    Lu,
+    /// Cholesky of A.
+    Cholesky,
+    /// Cholesky of A and one step with the residual taken from B.
+    Corrected,
+    /// Householder QR of B.
+    Qr,
+    /// QR of B with column pivoting, at the rank found.
+    PivotedQr,
+}
+
+/// What a solver found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solution<T> {
+    /// The method that found it.
+    pub rung: Rung,
+    /// Rank of B, as far as the method can tell.
+    pub rank: usize,
+    /// Estimate of the condition number of B (columns scaled), 0.1 to 1.2 times the true value.
+    pub condition: T,
+    /// By how much the weights miss their conditions, the largest over the outputs.
+    pub residual: Residual<T>,
+}
+
+/// Working memory of any solver, reused from stencil to stencil.
+#[derive(Clone, Debug, Default)]
+pub struct MomentScratch<T> {
+    pub(super) matrix: Vec<T>,
+    pub(super) diagonal: Vec<T>,
+    pub(super) factors: Vec<T>,
+    pub(super) order: Vec<usize>,
+    pub(super) a: Vec<T>,
+    pub(super) b: Vec<T>,
+    pub(super) y: Vec<T>,
+}
+
+/// Finds the weights of a filled [`MomentSystem`].
+pub trait MomentSolver: Clone + Send + Sync + 'static {
+    /// Writes the weights of output k into `w[k n..(k + 1) n]` and says how good they are.
+    ///
+    /// # Errors
+    /// [`OperatorError::Singular`](crate::OperatorError::Singular) where the method finds no weights at all. Whether
+    /// weights that exist are good enough is for the caller to judge from the residual.
+    fn solve<T: Scalar, const D: usize>(
+        &self,
+        system: &MomentSystem<T, D>,
+        scratch: &mut MomentScratch<T>,
+        w: &mut [T],
+    ) -> Result<Solution<T>>;
+}
+
+/// max over the outputs of their residuals, NaN being the largest.
+pub(super) fn worst<T: Scalar>(a: Residual<T>, b: Residual<T>) -> Residual<T> {
+    let larger = if a.absolute >= b.absolute || a.absolute != a.absolute { a.absolute } else { b.absolute };
+    Residual { absolute: larger, terms: a.terms.max(b.terms) }
+}
+
+/// The largest residual that is rounding and nothing else: 4 l eps cond(B) max|b|, and in all cases
+/// 30 l eps max_alpha sum_q |w_q z_q^alpha|.
+pub(super) fn gate<T: Scalar, const D: usize>(system: &MomentSystem<T, D>, solution: &Solution<T>) -> bool {
+    let unit = T::default_epsilon() * T::lift(system.conditions() as f64);
+    let Residual { absolute, terms } = solution.residual;
+    absolute <= T::lift(4.0) * unit * solution.condition * system.largest_required()
+        && absolute <= T::lift(30.0) * unit * terms
+}
+
+/// Largest and smallest singular value of a triangular factor by power and inverse iteration: `multiply` is R^T R,
+/// `solve` its inverse.
+pub(super) fn condition<T: Scalar>(
+    l: usize,
+    work: &mut Vec<T>,
+    mut multiply: impl FnMut(&mut [T]),
+    mut solve: impl FnMut(&mut [T]),
+) -> T {
+    let mut extreme = |apply: &mut dyn FnMut(&mut [T]), steps: usize| {
+        work.clear();
+        // A start that is orthogonal to no coordinate direction and to no mean.
+        work.extend((0..l).map(|i| T::lift(1.0 + 0.25 * (i % 3) as f64) * T::lift(if i % 2 == 0 { 1.0 } else { -1.0 })));
+        let mut growth = T::one();
+        for _ in 0..steps {
+            let norm = work.iter().fold(T::zero(), |sum, &x| sum + x * x).sqrt();
+            work.iter_mut().for_each(|x| *x /= norm);
+            apply(work);
+            growth = work.iter().fold(T::zero(), |sum, &x| sum + x * x).sqrt();
+        }
+        growth
+    };
+    let largest = extreme(&mut multiply, 3);
+    let smallest = extreme(&mut solve, 2);
+    (largest * smallest).sqrt()
+}
