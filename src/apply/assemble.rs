@@ -3,10 +3,14 @@
 use super::blocks::{BLOCK, each_block};
 use super::rows::{Centers, Rows};
 use super::{Field, MatrixFree, Report};
+use crate::domain::Domain;
 use crate::error::{Error, NeighborError, OperatorError, Result};
 use crate::kernel::{Kernel, SmoothingKernel};
-use crate::neighbors::Neighbors;
-use crate::operator::{Method, Outputs, Pse, RowReport, Sph};
+use crate::moment::MomentSolver;
+use crate::neighbors::{CellList, Neighbors};
+use crate::operator::{DcPse, Method, Operator, Outputs, Pse, RowReport, Sph};
+use crate::particles::Particles;
+use crate::scale::Cutoff;
 use crate::stencil::Stencil;
 
 impl<S: Outputs, T: Field> Rows<S, T> {
@@ -239,5 +243,63 @@ impl<W: SmoothingKernel<f64, D>, const D: usize, const N: usize> Sph<W, D, N> {
     /// As [`Rows::assemble`].
     pub fn matrix_free<'a, P: Neighbors<D>>(&'a self, neighbors: &'a P) -> Result<MatrixFree<'a, D, Self, P>> {
         MatrixFree::new(self, neighbors)
+    }
+}
+
+impl<Op, const R: u32, S: MomentSolver> DcPse<Op, R, S> {
+    /// Builds the rows of this operator, with `f64` weights; [`Rows::assemble`] rounds them to another type.
+    ///
+    /// # Errors
+    /// As [`Rows::assemble`].
+    pub fn assemble<const D: usize, const K: usize, P: Neighbors<D>>(&self, neighbors: &P) -> Result<Rows<[f64; K]>>
+    where
+        Op: Operator<D, Out = [f64; K]>,
+    {
+        Rows::assemble(self, neighbors)
+    }
+
+    /// The same operator without stored weights: they are computed anew in every application.
+    ///
+    /// # Errors
+    /// As [`Rows::assemble`].
+    pub fn matrix_free<'a, const D: usize, const K: usize, P: Neighbors<D>>(
+        &'a self,
+        neighbors: &'a P,
+    ) -> Result<MatrixFree<'a, D, Self, P>>
+    where
+        Op: Operator<D, Out = [f64; K]>,
+    {
+        MatrixFree::new(self, neighbors)
+    }
+
+    /// A cutoff that holds enough neighbors for every particle, those at edges and corners included.
+    ///
+    /// It starts from the ball that would hold them on a lattice of the same spacing and grows by 1.15 until the
+    /// particle with the fewest has enough.
+    ///
+    /// # Errors
+    /// [`OperatorError::TooFew`](crate::OperatorError::TooFew) naming the particle with the fewest neighbors where the
+    /// whole set holds too few; and those of [`Particles::spacing`] and [`CellList::build`].
+    pub fn cutoff<const D: usize>(&self, particles: &Particles<D>) -> Result<Cutoff>
+    where
+        Op: Operator<D>,
+    {
+        let needed = self.fewest_neighbors()?;
+        let h = particles.spacing()?.0;
+        // A ball of radius r holds about (2 r/h)^D / 2 lattice points, for D = 1 to 3 within a factor of 1.3.
+        let mut cutoff = 0.5 * h * (2.0 * needed as f64).powf(1.0 / D as f64);
+        loop {
+            let cells = CellList::build(particles, &Domain::open(), Cutoff(cutoff))?;
+            let counts = (0..particles.len()).map(|p| (cells.count(p, cutoff), p));
+            let Some((fewest, p)) = counts.min() else { return Ok(Cutoff(cutoff)) };
+            if fewest >= needed {
+                return Ok(Cutoff(cutoff));
+            }
+            if fewest + 1 == particles.len() {
+                let kind = OperatorError::TooFew { neighbors: fewest, conditions: needed, needed };
+                return Err(Error::from(kind).at(p));
+            }
+            cutoff *= 1.15;
+        }
     }
 }

@@ -29,7 +29,13 @@ pub struct Report {
     pub spectral_bound: f64,
     /// Rows that break a limit with the caller's leave.
     pub allowed: usize,
-    /// The row that breaks its limits worst, or, where none does, the row with the largest moment defect.
+    /// Largest estimated condition number of a moment system; 0 where none was solved.
+    pub condition: f64,
+    /// Largest miss of a moment condition, in scaled units.
+    pub residual: f64,
+    /// Rows per solver, in the order of [`Rung`](crate::Rung).
+    pub rungs: [usize; 5],
+    /// The row that breaks its limits worst, or, where none does, the row with the largest moment defect, then condition.
     pub worst: Option<RowReport>,
 }
 
@@ -42,6 +48,11 @@ impl Report {
         self.extremes(row.h_over_epsilon, row.moment_defect, row.sum_abs, row.spectral_bound);
         self.negative_weights += row.negative_weights;
         self.allowed += usize::from(row.allowed);
+        self.condition = self.condition.max(row.condition);
+        self.residual = self.residual.max(row.residual);
+        if let Some(rung) = row.rung {
+            self.rungs[rung as usize] += 1;
+        }
         self.rank(row);
     }
 
@@ -57,6 +68,11 @@ impl Report {
         self.extremes(next.h_over_epsilon, next.moment_defect, next.sum_abs, next.spectral_bound);
         self.negative_weights += next.negative_weights;
         self.allowed += next.allowed;
+        self.condition = self.condition.max(next.condition);
+        self.residual = self.residual.max(next.residual);
+        for (rows, next) in self.rungs.iter_mut().zip(next.rungs) {
+            *rows += next;
+        }
         if let Some(worst) = &next.worst {
             self.rank(worst);
         }
@@ -73,7 +89,8 @@ impl Report {
     fn rank(&mut self, row: &RowReport) {
         let key = |row: &RowReport| {
             let refused = row.breach.is_some() && !row.allowed;
-            (refused, row.severity(), if row.moment_defect.is_nan() { f64::INFINITY } else { row.moment_defect })
+            let defect = if row.moment_defect.is_nan() { f64::INFINITY } else { row.moment_defect };
+            (refused, row.severity(), defect, row.condition)
         };
         let worse = match &self.worst {
             None => true,

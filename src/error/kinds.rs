@@ -401,6 +401,39 @@ kinds! {
             /// Rank of the conditions on this stencil.
             rank: usize,
         } => "the {neighbors} neighbors give the {conditions} moment conditions rank {rank} only",
+        /// Fewer neighbors than the moment conditions need.
+        TooFew {
+            /// Number of neighbors n.
+            neighbors: usize,
+            /// Number of conditions l.
+            conditions: usize,
+            /// The fewest legal neighbors.
+            needed: usize,
+        } => "{neighbors} neighbors are fewer than the {needed} needed for {conditions} moment conditions",
+        /// A row whose moments miss their conditions by more than rounding.
+        Uncertified {
+            /// Number of neighbors n.
+            neighbors: usize,
+            /// Number of conditions l.
+            conditions: usize,
+            /// Rank of the conditions on this stencil.
+            rank: usize,
+            /// Estimated condition number.
+            condition: f64,
+            /// The largest miss, in scaled units.
+            residual: f64,
+            /// cutoff / epsilon.
+            ratio: f64,
+        } => "the {neighbors} neighbors miss the {conditions} moment conditions by {residual:e} (rank {rank}, condition {condition:e}, cutoff/epsilon {ratio})",
+        /// A window that is flat or has vanished inside the cutoff.
+        Window {
+            /// cutoff / epsilon.
+            ratio: f64,
+            /// Smallest legal value.
+            low: f64,
+            /// Largest legal value.
+            high: f64,
+        } => "cutoff/epsilon = {ratio} is outside {low} to {high}",
         /// The '+' sign asked for an even degree.
         PlusEven {
             /// The degree.

@@ -1,6 +1,6 @@
 //! Cholesky of the moment matrix A = B^T B, and one step that takes the residual from B.
 
-use super::solver::{MomentScratch, MomentSolver, Rung, Solution, condition, gate, worst};
+use super::solver::{MomentScratch, MomentSolver, Rung, Solution, condition, worst};
 use super::system::{MomentSystem, Residual};
 use crate::error::{OperatorError, Result};
 use crate::scalar::Scalar;
@@ -47,7 +47,7 @@ impl MomentSolver for Cholesky {
             y.resize(n, T::zero());
             accumulate(system, b, y);
             let mut row = Solution { residual: system.residual(k, y), ..solution };
-            if !gate(system, &row) {
+            if !row.is_sharp(system) {
                 system.defect(k, y, b);
                 solve(matrix, l, b);
                 accumulate(system, b, y);

@@ -2,7 +2,7 @@
 
 use super::cholesky::Cholesky;
 use super::qr::{PivotedQr, Qr};
-use super::solver::{MomentScratch, MomentSolver, Solution, gate};
+use super::solver::{MomentScratch, MomentSolver, Solution};
 use super::system::MomentSystem;
 use crate::error::Result;
 use crate::scalar::Scalar;
@@ -22,23 +22,15 @@ impl MomentSolver for Ladder {
         w: &mut [T],
     ) -> Result<Solution<T>> {
         if let Ok(solution) = Cholesky.solve(system, scratch, w)
-            && gate(system, &solution)
+            && solution.is_sharp(system)
         {
             return Ok(solution);
         }
         if let Ok(solution) = Qr.solve(system, scratch, w)
-            && gate(system, &solution)
+            && solution.holds(system)
         {
             return Ok(solution);
         }
         PivotedQr.solve(system, scratch, w)
-    }
-}
-
-impl<T: Scalar> Solution<T> {
-    /// Whether the residual is rounding and nothing else: at most 4 l eps cond(B) max|b| and at most
-    /// 30 l eps max_alpha sum_q |w_q z_q^alpha|. NaN is not.
-    pub fn holds<const D: usize>(&self, system: &MomentSystem<T, D>) -> bool {
-        gate(system, self)
     }
 }

@@ -66,13 +66,22 @@ pub(super) fn worst<T: Scalar>(a: Residual<T>, b: Residual<T>) -> Residual<T> {
     Residual { absolute: larger, terms: a.terms.max(b.terms) }
 }
 
-/// The largest residual that is rounding and nothing else: 4 l eps cond(B) max|b|, and in all cases
-/// 30 l eps max_alpha sum_q |w_q z_q^alpha|.
-pub(super) fn gate<T: Scalar, const D: usize>(system: &MomentSystem<T, D>, solution: &Solution<T>) -> bool {
-    let unit = T::default_epsilon() * T::lift(system.conditions() as f64);
-    let Residual { absolute, terms } = solution.residual;
-    absolute <= T::lift(4.0) * unit * solution.condition * system.largest_required()
-        && absolute <= T::lift(30.0) * unit * terms
+impl<T: Scalar> Solution<T> {
+    /// Whether the residual is rounding and nothing else: at most 4 l eps cond(B) max|b| and at most
+    /// 30 l eps max_alpha sum_q |w_q z_q^alpha|. NaN is not.
+    pub fn holds<const D: usize>(&self, system: &MomentSystem<T, D>) -> bool {
+        let unit = T::default_epsilon() * T::lift(system.conditions() as f64);
+        let Residual { absolute, terms } = self.residual;
+        absolute <= T::lift(4.0) * unit * self.condition * system.largest_required()
+            && absolute <= T::lift(30.0) * unit * terms
+    }
+
+    /// Whether it is also as small as QR leaves it, 16 eps max_alpha sum_q |w_q z_q^alpha|: what is asked of the cheaper
+    /// methods before the next is tried. Without l: rounding of a sum grows with its terms, not with their number.
+    pub(super) fn is_sharp<const D: usize>(&self, system: &MomentSystem<T, D>) -> bool {
+        let sharp = T::lift(16.0) * T::default_epsilon() * self.residual.terms;
+        self.holds(system) && self.residual.absolute <= sharp
+    }
 }
 
 /// Largest and smallest singular value of a triangular factor by power and inverse iteration: `multiply` is R^T R,
@@ -86,7 +95,9 @@ pub(super) fn condition<T: Scalar>(
     let mut extreme = |apply: &mut dyn FnMut(&mut [T]), steps: usize| {
         work.clear();
         // A start that is orthogonal to no coordinate direction and to no mean.
-        work.extend((0..l).map(|i| T::lift(1.0 + 0.25 * (i % 3) as f64) * T::lift(if i % 2 == 0 { 1.0 } else { -1.0 })));
+        work.extend(
+            (0..l).map(|i| T::lift(1.0 + 0.25 * (i % 3) as f64) * T::lift(if i % 2 == 0 { 1.0 } else { -1.0 })),
+        );
         let mut growth = T::one();
         for _ in 0..steps {
             let norm = work.iter().fold(T::zero(), |sum, &x| sum + x * x).sqrt();

@@ -2,6 +2,7 @@
 
 use super::expression::Outputs;
 use crate::error::{Error, OperatorError, Result};
+use crate::moment::Rung;
 use crate::stencil::Stencil;
 
 /// How a stencil becomes weights: the only trait a new method implements.
@@ -74,6 +75,16 @@ pub struct RowReport {
     pub h_over_epsilon: f64,
     /// Relative defect of the discrete moments.
     pub moment_defect: f64,
+    /// Number of moment conditions l that were solved for; 0 where none were.
+    pub conditions: usize,
+    /// Their rank on this stencil.
+    pub rank: usize,
+    /// Estimated condition number of the windowed, scaled monomials; 0 where no system was solved.
+    pub condition: f64,
+    /// The largest miss of a moment condition, in scaled units.
+    pub residual: f64,
+    /// Which solver found the weights.
+    pub rung: Option<Rung>,
     /// |d_p| + sum_q |w_pq|, the largest over the outputs: the gain of noise, in units of the operator.
     pub sum_abs: f64,
     /// Pairs whose weight is negative before the sign of an image; for a Laplacian each costs the maximum principle.
@@ -99,6 +110,11 @@ impl RowReport {
             neighbors: row.len(),
             h_over_epsilon: 0.0,
             moment_defect: 0.0,
+            conditions: 0,
+            rank: 0,
+            condition: 0.0,
+            residual: 0.0,
+            rung: None,
             sum_abs,
             negative_weights: 0,
             spectral_bound: 2.0 * sum_abs,

@@ -1,5 +1,6 @@
 //! Operators as data, and methods: how a stencil becomes weights.
 
+mod dcpse;
 mod expression;
 mod method;
 mod named;
@@ -8,6 +9,7 @@ mod pse;
 mod sph;
 mod typed;
 
+pub use dcpse::{CUTOFF_OVER_EPSILON, DcPse, DcPseScratch};
 pub use expression::{Expression, Operator, Outputs, ShowSum, Value};
 pub use method::{Allowance, Breach, Method, RowReport, spread};
 pub use named::{Along, Divergence, Gradient, Laplacian};
