@@ -1,4 +1,4 @@
-//! Discretized differential operators on particles: SPH and PSE, with their moment conditions checked per row.
+//! Discretized differential operators on particles: SPH, PSE and DC-PSE, with their moment conditions checked per row.
 //!
 //! One equation holds the crate together,
 //!
@@ -7,7 +7,7 @@
 //! ```
 //!
 //! and every module is one factor of it: [`MultiIndex`] and [`Beta`] name D^beta, kernels ([`Exchange`], [`Gaussian`])
-//! give w, [`CellList`] and its kin give the q, [`Pse`] and [`Sph`] turn a stencil into weights, [`Rows`] and
+//! give w, [`CellList`] and its kin give the q, [`Pse`], [`Sph`] and [`DcPse`] turn a stencil into weights, [`Rows`] and
 //! [`MatrixFree`] apply them to fields, and [`integrate`] advances u' = D u within a [`StepLimit`] known beforehand.
 //!
 //! ```
