@@ -62,7 +62,7 @@ pub trait MomentSolver: Clone + Send + Sync + 'static {
 
 /// max over the outputs of their residuals, NaN being the largest.
 pub(super) fn worst<T: Scalar>(a: Residual<T>, b: Residual<T>) -> Residual<T> {
-    let larger = if a.absolute >= b.absolute || a.absolute != a.absolute { a.absolute } else { b.absolute };
+    let larger = if a.absolute >= b.absolute || !a.absolute.is_finite() { a.absolute } else { b.absolute };
     Residual { absolute: larger, terms: a.terms.max(b.terms) }
 }
 
