@@ -63,6 +63,16 @@ impl Epsilon {
         self.0.get(p)
     }
 
+    /// How many epsilons are held, or `None` where one value serves any number.
+    pub fn len(&self) -> Option<usize> {
+        self.0.len()
+    }
+
+    /// Whether epsilons are held one per particle, for no particle.
+    pub fn is_empty(&self) -> bool {
+        self.len() == Some(0)
+    }
+
     /// The largest epsilon times `radius`: the cutoff a provider must be built with so that a kernel of this
     /// support radius (in units of epsilon) is not truncated. Zero for no particles.
     pub fn cutoff(&self, radius: f64) -> Cutoff {
@@ -123,10 +133,7 @@ impl Volumes {
 
     /// How many volumes are held, or `None` where one value serves any number.
     pub fn len(&self) -> Option<usize> {
-        match &self.0 {
-            PerParticle::Equal(_) => None,
-            PerParticle::Each(values) => Some(values.len()),
-        }
+        self.0.len()
     }
 
     /// Whether volumes are held one per particle, for no particle.
@@ -153,6 +160,13 @@ impl PerParticle {
             Self::Each(values) => {
                 values.get(p).copied().ok_or_else(|| OperatorError::Length { found: values.len(), index: p }.into())
             }
+        }
+    }
+
+    fn len(&self) -> Option<usize> {
+        match self {
+            Self::Equal(_) => None,
+            Self::Each(values) => Some(values.len()),
         }
     }
 

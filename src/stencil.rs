@@ -30,6 +30,8 @@ pub struct Stencil<const D: usize> {
     sources: Vec<u32>,
     separations: Vec<[f64; D]>,
     signs: Vec<i8>,
+    /// Room for sorting, kept so that sorting a row allocates nothing.
+    sorting: Vec<Neighbor<D>>,
 }
 
 impl<const D: usize> Stencil<D> {
@@ -101,9 +103,11 @@ impl<const D: usize> Stencil<D> {
     }
 
     /// Sorts the neighbors by separation (axis by axis, then sign, then source), which fixes the order of
-    /// summation whatever the provider and the numbering: M7 of the metamorphic relations.
+    /// summation whatever the provider and, unless two neighbors lie at one place, the numbering.
     pub fn sort(&mut self) {
-        let mut all: Vec<Neighbor<D>> = self.iter().collect();
+        let mut all = std::mem::take(&mut self.sorting);
+        all.clear();
+        all.extend(self.iter());
         all.sort_unstable_by(|a, b| {
             let axes = a.separation.iter().zip(&b.separation).map(|(x, y)| x.total_cmp(y));
             axes.fold(std::cmp::Ordering::Equal, |known, axis| known.then(axis))
@@ -111,8 +115,9 @@ impl<const D: usize> Stencil<D> {
                 .then(a.q.cmp(&b.q))
         });
         self.reset(self.target, self.center, self.cutoff);
-        for neighbor in all {
+        for &neighbor in &all {
             self.push(neighbor);
         }
+        self.sorting = all;
     }
 }

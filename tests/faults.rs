@@ -419,7 +419,7 @@ fn kernels_of_the_user_s_own_that_are_none_are_refused() -> Result<()> {
     let kind = |made: Result<_>| made.map(|_: Pse<Odd>| ()).unwrap_err().kind().clone();
     assert_eq!(kind(make(&[], 5.0, 1.0)), ErrorKind::MultiIndex(MultiIndexError::Empty { output: 0 }));
     for support in [0.0, -1.0, f64::INFINITY] {
-        let due = OperatorError::Setting { value: support.max(0.0) };
+        let due = OperatorError::Setting { value: support };
         assert_eq!(kind(make(&second, support, 1.0)), ErrorKind::Operator(due));
     }
     assert!(make(&second, f64::NAN, 1.0).is_err());

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use parops::{
     Allowance, Apply, BruteForce, CellList, Cutoff, D2, Domain, Epsilon, ErrorKind, Exchange, Expression, Face, Form,
-    Gradient, Laplacian, MultiIndex, NeighborError, Neighbors, OperatorError, Particles, Pse, Random, Rows, Sign,
-    Volumes, WideGaussian,
+    Gradient, Laplacian, LatticeSpectrum, MultiIndex, NeighborError, Neighbors, OperatorError, ParticleError,
+    Particles, Pse, Random, Rows, Sign, Volumes, WideGaussian,
 };
 
 type Failure = Result<(), parops::Error>;
@@ -366,15 +366,16 @@ fn settings_and_lengths_are_checked() -> Failure {
     let identity = Pse::new(D2::<0, 0>::default(), 2, Epsilon::global(0.08)?, volumes).unwrap_err();
     assert!(matches!(*identity.kind(), ErrorKind::Operator(OperatorError::Degree { degree: 0, low: 1 })));
 
-    // Volumes or epsilons for fewer particles than there are.
+    // Volumes or epsilons for fewer or more particles than there are.
     let neighbors = CellList::build(&particles, &unit_torus(), pse().cutoff())?;
-    let few = Volumes::each(vec![1.0 / 400.0; 399])?;
-    let error = Pse::new(Laplacian::<2>, 2, Epsilon::global(0.08)?, &few)?.assemble(&neighbors).unwrap_err();
-    assert!(matches!(*error.kind(), ErrorKind::Operator(OperatorError::Length { found: 399, index: 399 })));
-    let few = Epsilon::each(vec![0.08; 10])?;
-    let error = Pse::new(Laplacian::<2>, 2, few, volumes)?.assemble(&neighbors).unwrap_err();
-    assert!(matches!(*error.kind(), ErrorKind::Operator(OperatorError::Length { found: 10, index: 10 })));
-    assert_eq!(error.particle(), Some(10));
+    for found in [399, 401] {
+        let other = Volumes::each(vec![1.0 / 400.0; found])?;
+        let error = Pse::new(Laplacian::<2>, 2, Epsilon::global(0.08)?, &other)?.assemble(&neighbors).unwrap_err();
+        assert_eq!(*error.kind(), ErrorKind::Particle(ParticleError::Length { found, needed: 400 }));
+        let other = Pse::new(Laplacian::<2>, 2, Epsilon::each(vec![0.08; found])?, volumes)?;
+        let error = other.matrix_free(&neighbors).map(|_| ()).unwrap_err();
+        assert_eq!(*error.kind(), ErrorKind::Particle(ParticleError::Length { found, needed: 400 }));
+    }
     Ok(())
 }
 
@@ -501,4 +502,86 @@ fn kernels_of_different_degree_make_no_operator() {
         error.kind(),
         ErrorKind::MultiIndex(parops::MultiIndexError::UnequalDegree { first: 2, other: 1 })
     ));
+}
+
+#[test]
+fn repeated_multi_indices_are_one_condition() -> Failure {
+    let particles = lattice(30);
+    let epsilon = Epsilon::global(0.07)?;
+    let twice = D2::<2, 0>::default() + D2::<2, 0>::default();
+    let pse = Pse::new(twice, 4, epsilon.clone(), particles.volumes()?)?;
+    let neighbors = CellList::build(&particles, &unit_torus(), pse.cutoff())?;
+    let rows = pse.assemble(&neighbors)?;
+    let once = Pse::new(2.0 * D2::<2, 0>::default(), 4, epsilon.clone(), particles.volumes()?)?.assemble(&neighbors)?;
+    let (f, mut a, mut b) = (values(&particles, wave), vec![0.0; 900], vec![0.0; 900]);
+    rows.apply(&f, &mut a)?;
+    once.apply(&f, &mut b)?;
+    assert_eq!(a, b);
+    let nested = Laplacian::<2> - 3.0 * (D2::<1, 1>::default() + 0.5 * D2::<0, 2>::default());
+    assert!(Pse::new(nested, 4, epsilon, particles.volumes()?)?.assemble(&neighbors).is_ok());
+    Ok(())
+}
+
+#[test]
+fn lower_moments_are_reported_where_scattered_sets_make_the_error_grow() -> Failure {
+    // A jitter of 0.05 h keeps M_2 within 3 %, so the rows are accepted; M_1 / epsilon is what refinement multiplies.
+    let mut previous = 0.0;
+    for n in [100, 400, 1600] {
+        let particles = Particles::jittered([0.0], [1.0], [n], 0.05, 1)?;
+        let pse = Pse::new(Laplacian::<1>, 2, Epsilon::global(2.0 / n as f64)?, particles.volumes()?)?;
+        let ring = Domain::periodic([0.0], [1.0])?;
+        let rows = pse.assemble(&CellList::build(&particles, &ring, pse.cutoff())?)?;
+        assert!(rows.report().moment_defect < 0.05 && rows.report().lower_moment > 1e-3);
+        let f: Vec<f64> = particles.points().iter().map(|x| (TAU * x[0]).sin()).collect();
+        let mut out = vec![0.0; n];
+        rows.apply(&f, &mut out)?;
+        let squares: f64 = out.iter().zip(&f).map(|(out, f)| (out + TAU * TAU * f).powi(2)).sum();
+        let error = (squares / n as f64).sqrt();
+        assert!(error > 2.0 * previous, "n = {n}: {error} after {previous}");
+        previous = error;
+    }
+    let even = lattice(32);
+    let pse = Pse::new(Laplacian::<2>, 2, Epsilon::global(0.07)?, even.volumes()?)?;
+    let rows = pse.assemble(&CellList::build(&even, &unit_torus(), pse.cutoff())?)?;
+    assert!(rows.report().lower_moment < 1e-12);
+    Ok(())
+}
+
+#[test]
+fn kernel_cut_off_inside_its_support_loses_the_bound_of_positive_definite_kernels() -> Failure {
+    let particles = lattice(24);
+    let epsilon = 2.0 / 24.0;
+    let wide = || {
+        Pse::with_kernels([WideGaussian::<2>::new()], Epsilon::global(epsilon).unwrap(), particles.volumes().unwrap())
+    };
+    let cut = wide()?.support(5.0)?;
+    let rows = cut.assemble(&CellList::build(&particles, &unit_torus(), cut.cutoff())?)?;
+    // lambda_max by the lattice scan: the bound must be above it.
+    let spectrum = LatticeSpectrum::scan(&WideGaussian::<2>::new(), 0.5, 5.0)?;
+    assert!(rows.report().spectral_bound * epsilon * epsilon >= spectrum.lambda_max);
+    let ratio = rows.report().spectral_bound / (2.0 * rows.report().sum_abs);
+    assert!((ratio - 1.0).abs() <= round_off(rows.report().most));
+    Ok(())
+}
+
+#[test]
+fn matrix_free_gradient_divergence_and_velocity_have_the_bits_of_stored_rows() -> Failure {
+    let particles = Particles::jittered([0.0; 2], [1.0; 2], [20; 2], 0.1, 4)?;
+    let pse = Pse::new(Gradient::<2>, 2, Epsilon::global(0.08)?, particles.volumes()?)?.allow(Allowance::Everywhere);
+    let neighbors = CellList::build(&particles, &unit_torus(), pse.cutoff())?;
+    let (rows, free) = (pse.assemble(&neighbors)?, pse.matrix_free(&neighbors)?);
+    let f = values(&particles, wave);
+    let v: Vec<[f64; 2]> = particles.points().iter().map(|x| [x[1], -x[0]]).collect();
+    let (mut a, mut b) = (vec![[0.0; 2]; 400], vec![[0.0; 2]; 400]);
+    rows.apply_all(&f, &mut a)?;
+    free.apply_all(&f, &mut b)?;
+    assert_eq!(a, b);
+    let (mut a, mut b) = (vec![0.0; 400], vec![0.0; 400]);
+    rows.apply_dot(&v, &mut a)?;
+    free.apply_dot(&v, &mut b)?;
+    assert_eq!(a, b);
+    rows.apply_along(&v, &f, &mut a)?;
+    free.apply_along(&v, &f, &mut b)?;
+    assert_eq!(a, b);
+    Ok(())
 }

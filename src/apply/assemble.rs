@@ -9,7 +9,7 @@ use crate::kernel::{Kernel, SmoothingKernel};
 use crate::moment::MomentSolver;
 use crate::neighbors::{CellList, Neighbors};
 use crate::operator::{DcPse, Method, Operator, Outputs, Pse, RowReport, Sph};
-use crate::particles::Particles;
+use crate::particles::{Particles, reserved};
 use crate::scale::Cutoff;
 use crate::stencil::Stencil;
 
@@ -22,16 +22,18 @@ impl<S: Outputs, T: Field> Rows<S, T> {
     /// # Errors
     /// [`NeighborError::Reach`] naming the target whose cutoff is beyond the provider; [`NeighborError::Source`] and
     /// [`NeighborError::Offsets`] for a provider that names sources it does not have or counts others than it gathers;
-    /// what the method refuses; [`OperatorError::Weight`] where a weight is not finite, in `f64` or rounded to `T`; and
+    /// [`ParticleError::Memory`](crate::ParticleError::Memory) where the rows do not fit; what the method refuses;
+    /// [`OperatorError::Weight`] where a weight is not finite, in `f64` or rounded to `T`; and
     /// [`OperatorError::Overlap`] or [`OperatorError::Moment`] naming the worst row that breaks a limit without leave.
     pub fn assemble<const D: usize, M: Method<D, Out = S>, P: Neighbors<D>>(method: &M, neighbors: &P) -> Result<Self> {
         let targets = neighbors.targets();
+        method.validate(targets, neighbors.sources())?;
         let offsets = count(method, neighbors)?;
         let pairs = offsets.last().copied().unwrap_or(0);
         let zero = S::ZERO.map(T::lift);
-        let mut columns = vec![0_u32; pairs];
-        let mut weights = vec![zero; pairs];
-        let mut diagonal = vec![zero; targets];
+        let mut columns = filled(pairs, 0_u32)?;
+        let mut weights = filled(pairs, zero)?;
+        let mut diagonal = filled(targets, zero)?;
 
         let blocks = Blocks {
             offsets: &offsets,
@@ -88,6 +90,13 @@ fn finite<'a, const D: usize, T: Field>(
     }
 }
 
+/// `count` copies of a value, or an error where there is no memory for them.
+fn filled<V: Copy>(count: usize, value: V) -> Result<Vec<V>> {
+    let mut values = reserved(count)?;
+    values.resize(count, value);
+    Ok(values)
+}
+
 /// The cutoff of target p: the method's own, or the provider's.
 fn cutoff<const D: usize, M: Method<D>, P: Neighbors<D>>(method: &M, neighbors: &P, p: usize) -> Result<f64> {
     let cutoff = method.cutoff(p).map_err(|error| error.at(p))?.unwrap_or_else(|| neighbors.cutoff(p));
@@ -98,7 +107,7 @@ fn cutoff<const D: usize, M: Method<D>, P: Neighbors<D>>(method: &M, neighbors: 
 /// Where each row begins.
 fn count<const D: usize, M: Method<D>, P: Neighbors<D>>(method: &M, neighbors: &P) -> Result<Vec<usize>> {
     let targets = neighbors.targets();
-    let mut offsets = vec![0_usize; targets + 1];
+    let mut offsets = filled(targets + 1, 0_usize)?;
     each_block(offsets[1..].chunks_mut(BLOCK).enumerate(), |(b, counts)| {
         for (i, count) in counts.iter_mut().enumerate() {
             let p = b * BLOCK + i;

@@ -4,7 +4,8 @@ use std::sync::{Mutex, PoisonError};
 
 use super::assemble::Worker;
 use super::blocks::{BLOCK, each_block};
-use super::{Apply, Field, Report, check, check_results};
+use super::sweep::Sweep;
+use super::{Apply, Field, Report, check, check_results, scalars};
 use crate::error::Result;
 use crate::neighbors::Neighbors;
 use crate::operator::Method;
@@ -28,6 +29,7 @@ impl<'a, const D: usize, M: Method<D>, P: Neighbors<D>> MatrixFree<'a, D, M, P> 
     pub fn new(method: &'a M, neighbors: &'a P) -> Result<Self> {
         let mut operator = Self { method, neighbors, report: Report::default(), workers: Mutex::default() };
         let targets = neighbors.targets();
+        method.validate(targets, neighbors.sources())?;
         let blocks = (0..targets).step_by(BLOCK).map(|first| first..targets.min(first + BLOCK));
         let reports = each_block(blocks, |rows| {
             operator.with_worker(|worker| {
@@ -61,6 +63,54 @@ impl<'a, const D: usize, M: Method<D>, P: Neighbors<D>> MatrixFree<'a, D, M, P> 
     }
 }
 
+impl<const D: usize, const K: usize, M: Method<D, Out = [f64; K]>, P: Neighbors<D>> MatrixFree<'_, D, M, P> {
+    /// Fills row after row and hands each to `row`, which gives its result.
+    fn each<T: Send>(&self, out: &mut [T], row: impl Fn(usize, &Worker<D, M>) -> T + Sync + Send) -> Result<()> {
+        each_block(out.chunks_mut(BLOCK).enumerate(), |(b, out)| {
+            self.with_worker(|worker| {
+                for (i, out) in out.iter_mut().enumerate() {
+                    let p = b * BLOCK + i;
+                    worker.fill(self.method, self.neighbors, p)?;
+                    *out = row(p, worker);
+                }
+                Ok(())
+            })
+        })?;
+        Ok(())
+    }
+
+    /// All K outputs of a scalar field, as [`Rows::apply_all`](super::Rows::apply_all).
+    ///
+    /// # Errors
+    /// As [`Apply::apply`].
+    pub fn apply_all<T: Field>(&self, f: &[T], out: &mut [[T; K]]) -> Result<()> {
+        check(scalars(f), self.neighbors.sources(), out, self.neighbors.targets())?;
+        self.each(out, |_, worker| worker.all(f))?;
+        check_results(out)
+    }
+
+    /// The contraction with a vector field, as [`Rows::apply_dot`](super::Rows::apply_dot).
+    ///
+    /// # Errors
+    /// As [`Apply::apply`].
+    pub fn apply_dot<T: Field>(&self, f: &[[T; K]], out: &mut [T]) -> Result<()> {
+        check(f, self.neighbors.sources(), out, self.neighbors.targets())?;
+        self.each(out, |_, worker| worker.dot(f))?;
+        check_results(scalars(out))
+    }
+
+    /// The derivative along a vector per target, as [`Rows::apply_along`](super::Rows::apply_along).
+    ///
+    /// # Errors
+    /// As [`Rows::apply_along`](super::Rows::apply_along).
+    pub fn apply_along<T: Field>(&self, v: &[[T; K]], f: &[T], out: &mut [T]) -> Result<()> {
+        check(scalars(f), self.neighbors.sources(), out, self.neighbors.targets())?;
+        check(v, self.neighbors.targets(), out, self.neighbors.targets())?;
+        self.each(out, |p, worker| worker.along(&v[p], f))?;
+        check_results(scalars(out))
+    }
+}
+
 impl<T: Field, const D: usize, M, P> Apply<T> for MatrixFree<'_, D, M, P>
 where
     M: Method<D, Out = [f64; 1]>,
@@ -75,32 +125,24 @@ where
     }
 
     fn apply(&self, f: &[T], out: &mut [T]) -> Result<()> {
-        check(f.as_chunks::<1>().0, self.neighbors.sources(), out, self.neighbors.targets())?;
-        each_block(out.chunks_mut(BLOCK).enumerate(), |(b, out)| {
-            self.with_worker(|worker| {
-                for (i, out) in out.iter_mut().enumerate() {
-                    worker.fill(self.method, self.neighbors, b * BLOCK + i)?;
-                    *out = worker.apply(f);
-                }
-                Ok(())
-            })
-        })?;
-        check_results(out.as_chunks::<1>().0)
+        self.apply_all(f, out.as_chunks_mut().0)
     }
 }
 
-impl<const D: usize, M: Method<D, Out = [f64; 1]>> Worker<D, M> {
-    /// The row just filled, applied: the arithmetic of stored rows, with weights rounded like theirs.
-    fn apply<T: Field>(&self, f: &[T]) -> T {
-        let center = self.row.center().map(|center| f[center]);
-        let mut sum = T::zero();
-        if let Some(fp) = center {
-            sum += T::lift(self.diagonal[0]) * fp;
-        }
-        for (&q, w) in self.row.sources().iter().zip(&self.weights) {
-            let fq = f[q as usize];
-            sum += T::lift(w[0]) * center.map_or(fq, |fp| fq - fp);
-        }
-        sum
+/// The row just filled, with weights rounded like stored ones.
+impl<T: Field, const D: usize, const K: usize, M: Method<D, Out = [f64; K]>> Sweep<T, K> for Worker<D, M> {
+    #[inline(always)]
+    fn center(&self) -> Option<usize> {
+        self.row.center()
+    }
+
+    #[inline(always)]
+    fn diagonal(&self) -> Option<[T; K]> {
+        Some(self.diagonal.map(T::lift))
+    }
+
+    #[inline(always)]
+    fn pairs(&self) -> impl Iterator<Item = (usize, [T; K])> {
+        self.row.sources().iter().zip(&self.weights).map(|(&q, w)| (q as usize, w.map(T::lift)))
     }
 }

@@ -5,6 +5,7 @@ mod blocks;
 mod matrix_free;
 mod report;
 mod rows;
+mod sweep;
 
 pub use matrix_free::MatrixFree;
 pub use report::Report;
@@ -62,4 +63,9 @@ fn check_results<T: Field, Out: AsRef<[T]>>(out: &[Out]) -> Result<()> {
         Some((p, value)) => Err(Error::from(ApplyError::Overflow { value: value.as_() }).at(p)),
         None => Ok(()),
     }
+}
+
+/// A scalar field seen as a field of one value per particle.
+fn scalars<T: Field>(f: &[T]) -> &[[T; 1]] {
+    f.as_chunks().0
 }

@@ -21,6 +21,9 @@ pub struct Report {
     pub h_over_epsilon: f64,
     /// Largest relative defect of the discrete moments.
     pub moment_defect: f64,
+    /// Largest moment below the degree of the operator, see [`RowReport::lower_moment`]: where it is not zero, the
+    /// error of PSE and SPH grows under refinement.
+    pub lower_moment: f64,
     /// Largest sum of absolute weights.
     pub sum_abs: f64,
     /// Negative pair weights, summed over all rows.
@@ -46,6 +49,7 @@ impl Report {
         self.rows += 1;
         self.pairs += row.neighbors;
         self.extremes(row.h_over_epsilon, row.moment_defect, row.sum_abs, row.spectral_bound);
+        self.lower_moment = worse(self.lower_moment, row.lower_moment);
         self.negative_weights += row.negative_weights;
         self.allowed += usize::from(row.allowed);
         self.condition = self.condition.max(row.condition);
@@ -66,6 +70,7 @@ impl Report {
         self.rows += next.rows;
         self.pairs += next.pairs;
         self.extremes(next.h_over_epsilon, next.moment_defect, next.sum_abs, next.spectral_bound);
+        self.lower_moment = worse(self.lower_moment, next.lower_moment);
         self.negative_weights += next.negative_weights;
         self.allowed += next.allowed;
         self.condition = self.condition.max(next.condition);

@@ -1,7 +1,8 @@
 //! Stored rows: the weights of any method, for any number of applications.
 
 use super::blocks::each_row;
-use super::{Apply, Field, Report, check, check_results};
+use super::sweep::Sweep;
+use super::{Apply, Field, Report, check, check_results, scalars};
 use crate::error::{ApplyError, Result};
 use crate::operator::Outputs;
 
@@ -102,21 +103,41 @@ impl<S: Outputs, T: Field> Rows<S, T> {
     }
 }
 
-impl<const K: usize, T: Field> Rows<[f64; K], T> {
-    /// One row of K outputs: `own` is taken from the center, `value(q)` from a source.
+/// A stored row, ready to be summed.
+struct Stored<'a, T, const K: usize> {
+    sources: &'a [u32],
+    weights: &'a [[T; K]],
+    diagonal: Option<[T; K]>,
+    center: Option<usize>,
+}
+
+impl<T: Field, const K: usize> Sweep<T, K> for Stored<'_, T, K> {
     #[inline(always)]
-    fn gather<In: Copy>(&self, p: usize, f: &[In], mut add: impl FnMut(&[T; K], In, Option<In>)) {
-        let range = self.offsets[p]..self.offsets[p + 1];
-        let center = self.centers.get(p).map(|center| f[center]);
-        for (&q, w) in self.columns[range.clone()].iter().zip(&self.weights[range]) {
-            add(w, f[q as usize], center);
-        }
+    fn center(&self) -> Option<usize> {
+        self.center
     }
 
-    /// d_p f_p of every output.
     #[inline(always)]
-    fn start(&self, p: usize) -> Option<(&[T; K], usize)> {
-        Some((self.diagonal.get(p)?, self.centers.get(p)?))
+    fn diagonal(&self) -> Option<[T; K]> {
+        self.diagonal
+    }
+
+    #[inline(always)]
+    fn pairs(&self) -> impl Iterator<Item = (usize, [T; K])> {
+        self.sources.iter().zip(self.weights).map(|(&q, &w)| (q as usize, w))
+    }
+}
+
+impl<const K: usize, T: Field> Rows<[f64; K], T> {
+    #[inline(always)]
+    fn stored(&self, p: usize) -> Stored<'_, T, K> {
+        let range = self.offsets[p]..self.offsets[p + 1];
+        Stored {
+            sources: &self.columns[range.clone()],
+            weights: &self.weights[range],
+            diagonal: self.diagonal.get(p).copied(),
+            center: self.centers.get(p),
+        }
     }
 
     /// All K outputs of a scalar field, `out[p][k]` = (L_k f)_p.
@@ -125,21 +146,7 @@ impl<const K: usize, T: Field> Rows<[f64; K], T> {
     /// As [`Apply::apply`].
     pub fn apply_all(&self, f: &[T], out: &mut [[T; K]]) -> Result<()> {
         check(scalars(f), self.sources, out, self.targets())?;
-        each_row(out, |p| {
-            let mut sum = [T::zero(); K];
-            if let Some((d, center)) = self.start(p) {
-                for (sum, &d) in sum.iter_mut().zip(d) {
-                    *sum += d * f[center];
-                }
-            }
-            self.gather(p, f, |w, fq, fp| {
-                let value = fp.map_or(fq, |fp| fq - fp);
-                for (sum, &w) in sum.iter_mut().zip(w) {
-                    *sum += w * value;
-                }
-            });
-            sum
-        });
+        each_row(out, |p| self.stored(p).all(f));
         check_results(out)
     }
 
@@ -149,20 +156,7 @@ impl<const K: usize, T: Field> Rows<[f64; K], T> {
     /// As [`Apply::apply`].
     pub fn apply_dot(&self, f: &[[T; K]], out: &mut [T]) -> Result<()> {
         check(f, self.sources, out, self.targets())?;
-        each_row(out, |p| {
-            let mut sum = T::zero();
-            if let Some((d, center)) = self.start(p) {
-                for k in 0..K {
-                    sum += d[k] * f[center][k];
-                }
-            }
-            self.gather(p, f, |w, fq, fp| {
-                for k in 0..K {
-                    sum += w[k] * fp.map_or(fq[k], |fp| fq[k] - fp[k]);
-                }
-            });
-            sum
-        });
+        each_row(out, |p| self.stored(p).dot(f));
         check_results(scalars(out))
     }
 
@@ -174,22 +168,9 @@ impl<const K: usize, T: Field> Rows<[f64; K], T> {
     pub fn apply_along(&self, v: &[[T; K]], f: &[T], out: &mut [T]) -> Result<()> {
         check(scalars(f), self.sources, out, self.targets())?;
         check(v, self.targets(), out, self.targets())?;
-        each_row(out, |p| {
-            let along = |w: &[T; K]| w.iter().zip(&v[p]).fold(T::zero(), |sum, (&w, &v)| sum + v * w);
-            let mut sum = T::zero();
-            if let Some((d, center)) = self.start(p) {
-                sum += along(d) * f[center];
-            }
-            self.gather(p, f, |w, fq, fp| sum += along(w) * fp.map_or(fq, |fp| fq - fp));
-            sum
-        });
+        each_row(out, |p| self.stored(p).along(&v[p], f));
         check_results(scalars(out))
     }
-}
-
-/// A scalar field seen as a field of one value per particle.
-fn scalars<T: Field>(f: &[T]) -> &[[T; 1]] {
-    f.as_chunks().0
 }
 
 impl<T: Field> Apply<T> for Rows<[f64; 1], T> {

@@ -3,7 +3,7 @@
 use super::expression::{Operator, collect};
 use super::method::{Method, RowReport, spread};
 use super::pse::Sign;
-use crate::error::{Error, MultiIndexError, OperatorError, Result};
+use crate::error::{Error, MultiIndexError, OperatorError, ParticleError, Result};
 use crate::moment::{Ladder, MomentScratch, MomentSolver, MomentSystem, Window};
 use crate::multi_index::common_degree;
 use crate::scale::Epsilon;
@@ -224,6 +224,13 @@ where
 
     fn scratch(&self) -> Result<DcPseScratch<D>> {
         self.prepare()
+    }
+
+    fn validate(&self, targets: usize, _: usize) -> Result<()> {
+        match self.epsilon.as_ref().and_then(Epsilon::len) {
+            Some(found) if found != targets => Err(ParticleError::Length { found, needed: targets }.into()),
+            _ => Ok(()),
+        }
     }
 
     fn weights(

@@ -28,6 +28,15 @@ pub trait Method<const D: usize>: Sync {
     /// Where a parameter of the method is illegal.
     fn scratch(&self) -> Result<Self::Scratch>;
 
+    /// Checks that what the method holds per particle is there for so many targets and sources. Called once a build.
+    ///
+    /// # Errors
+    /// [`ParticleError::Length`](crate::ParticleError::Length) where it is not.
+    fn validate(&self, targets: usize, sources: usize) -> Result<()> {
+        let _ = (targets, sources);
+        Ok(())
+    }
+
     /// The cutoff this method wants for target p; `None` takes the provider's.
     ///
     /// # Errors
@@ -73,8 +82,11 @@ pub struct RowReport {
     pub neighbors: usize,
     /// h/epsilon, with h = V^(1/D).
     pub h_over_epsilon: f64,
-    /// Relative defect of the discrete moments.
+    /// Relative defect of the discrete moments that are checked.
     pub moment_defect: f64,
+    /// The largest moment M_alpha with 0 < |alpha| < m, relative to the required ones: zero on lattices, and not
+    /// checked. It adds M_alpha D^alpha f / epsilon^(m - |alpha|) to the result, which grows under refinement.
+    pub lower_moment: f64,
     /// Number of moment conditions l that were solved for; 0 where none were.
     pub conditions: usize,
     /// Their rank on this stencil.
@@ -110,6 +122,7 @@ impl RowReport {
             neighbors: row.len(),
             h_over_epsilon: 0.0,
             moment_defect: 0.0,
+            lower_moment: 0.0,
             conditions: 0,
             rank: 0,
             condition: 0.0,

@@ -4,6 +4,7 @@ mod dcpse;
 mod expression;
 mod method;
 mod named;
+mod pair_report;
 mod pairwise;
 mod pse;
 mod sph;

@@ -1,17 +1,14 @@
 //! What PSE and SPH share: a fixed kernel, weighted by the volumes, with overlap and moments checked per row.
 
-use super::method::{Allowance, Breach, RowReport, spread};
-use crate::error::{MultiIndexError, OperatorError, Result};
+use super::method::{Allowance, spread};
+use crate::error::{MultiIndexError, OperatorError, ParticleError, Result};
 use crate::kernel::Kernel;
-use crate::multi_index::{MultiIndex, Term, common_degree};
+use crate::multi_index::common_degree;
 use crate::scale::{Epsilon, Volumes};
 use crate::stencil::Stencil;
 
 /// Relative defect of the discrete moments above which a row is refused unless the caller sets another value.
 pub const MOMENT_TOLERANCE: f64 = 0.05;
-
-/// An overlap limit is a design figure; a spacing computed from a volume may exceed it by round-off.
-const ROUND_OFF: f64 = 1e-12;
 
 /// How the two values of a pair enter: with e = eps^(-D-m) eta(z), the term of a pair is
 /// V_q e (f_q + sigma f_p), or V_p e f_q + sigma V_q e f_p in strengths.
@@ -28,12 +25,12 @@ pub(super) enum Pairing {
 /// A method whose weight depends on the pair alone: kernels of one degree, one per output.
 #[derive(Clone, Debug)]
 pub(super) struct Pairwise<K, const N: usize> {
-    kernels: [K; N],
-    degree: u32,
-    support: f64,
-    overlap_limit: f64,
-    epsilon: Epsilon,
-    volumes: Volumes,
+    pub(super) kernels: [K; N],
+    pub(super) degree: u32,
+    pub(super) support: f64,
+    pub(super) overlap_limit: f64,
+    pub(super) epsilon: Epsilon,
+    pub(super) volumes: Volumes,
     pub(super) pairing: Pairing,
     pub(super) strengths: bool,
     pub(super) tolerance: f64,
@@ -43,9 +40,9 @@ pub(super) struct Pairwise<K, const N: usize> {
 /// Working memory: scaled separations, V_q epsilon^-D, and eta of every output, neighbor after neighbor.
 #[derive(Clone, Debug, Default)]
 pub struct PairScratch<const D: usize> {
-    z: Vec<[f64; D]>,
-    volume: Vec<f64>,
-    eta: Vec<f64>,
+    pub(super) z: Vec<[f64; D]>,
+    pub(super) volume: Vec<f64>,
+    pub(super) eta: Vec<f64>,
 }
 
 impl<K, const N: usize> Pairwise<K, N> {
@@ -66,14 +63,14 @@ impl<K, const N: usize> Pairwise<K, N> {
             if other != first {
                 return Err(MultiIndexError::UnequalDegree { first, other }.into());
             }
-            support = support.max(kernel.support());
-            overlap_limit = overlap_limit.min(kernel.overlap_limit());
+            support = support.max(positive(kernel.support())?);
+            overlap_limit = overlap_limit.min(positive(kernel.overlap_limit())?);
         }
         let degree = degree.ok_or(MultiIndexError::Empty { output: 0 })?;
         Ok(Self {
             kernels,
             degree,
-            support: positive(support)?,
+            support,
             overlap_limit,
             epsilon,
             volumes: volumes.clone(),
@@ -84,16 +81,14 @@ impl<K, const N: usize> Pairwise<K, N> {
         })
     }
 
-    pub(super) fn degree(&self) -> u32 {
-        self.degree
-    }
-
-    pub(super) fn epsilon(&self) -> &Epsilon {
-        &self.epsilon
-    }
-
-    pub(super) fn support(&self) -> f64 {
-        self.support
+    /// Refuses epsilons or volumes of another number of particles.
+    pub(super) fn validate(&self, targets: usize, sources: usize) -> Result<()> {
+        for (held, needed) in [(self.epsilon.len(), targets), (self.volumes.len(), sources)] {
+            if let Some(found) = held.filter(|&found| found != needed) {
+                return Err(ParticleError::Length { found, needed }.into());
+            }
+        }
+        Ok(())
     }
 
     pub(super) fn set_support(&mut self, radius: f64) -> Result<()> {
@@ -107,98 +102,13 @@ impl<K, const N: usize> Pairwise<K, N> {
     }
 
     /// Value at the center, V_p epsilon^-D eta(0), where the center exists.
-    fn own<const D: usize>(&self, kernel: &K, row: &Stencil<D>) -> Result<f64>
+    pub(super) fn own<const D: usize>(&self, kernel: &K, row: &Stencil<D>) -> Result<f64>
     where
         K: Kernel<f64, D>,
     {
         let Some(center) = row.center() else { return Ok(0.0) };
         let inverse = 1.0 / self.epsilon.get(row.target())?;
         Ok(times(self.volumes.get(center)?, inverse, D) * kernel.value(&[0.0; D]))
-    }
-
-    /// h/epsilon at the target: h from its own volume, or from the mean volume of its neighbors off the particles.
-    fn h_over_epsilon<const D: usize>(&self, row: &Stencil<D>, scratch: &PairScratch<D>) -> Result<f64> {
-        let inverse = 1.0 / self.epsilon.get(row.target())?;
-        let volume = match row.center() {
-            Some(center) => times(self.volumes.get(center)?, inverse, D),
-            None => scratch.volume.iter().sum::<f64>() / (row.len().max(1) as f64),
-        };
-        Ok(volume.powf(1.0 / D as f64))
-    }
-
-    /// The defect of one kernel's moments: the M_beta of its terms relative to the largest one required, and M_0
-    /// where the pairing leaves M_0 f_p in the result.
-    fn moment_defect<const D: usize>(&self, n: usize, row: &Stencil<D>, scratch: &PairScratch<D>) -> Result<f64>
-    where
-        K: Kernel<f64, D>,
-    {
-        let kernel = &self.kernels[n];
-        let moment = |beta: MultiIndex<D>| -> f64 {
-            let pairs = scratch.z.iter().zip(&scratch.volume).enumerate();
-            // Where the kernel underflows z^beta may overflow: zero times infinity must not enter.
-            let weights = pairs.map(|(i, (z, volume))| (z, volume * scratch.eta[i * N + n]));
-            weights.filter(|&(_, weight)| weight != 0.0).map(|(z, weight)| weight * beta.power(z)).sum()
-        };
-        let (mut defect, mut largest) = (0.0_f64, 0.0_f64);
-        if self.degree > 0 {
-            for &Term { index, factor } in kernel.terms() {
-                let required = f64::from(index.sign()) * factor * index.factorial()? as f64;
-                largest = largest.max(required.abs());
-                defect = worse(defect, (moment(index) - required).abs());
-            }
-            // A zero operator requires nothing but zeros: then the defect is absolute.
-            if largest > 0.0 {
-                defect /= largest;
-            }
-        }
-        let zeroth = match self.pairing {
-            Pairing::Difference => 0.0,
-            Pairing::Sum => moment(MultiIndex::ZERO),
-            Pairing::Summation => {
-                let required = if self.degree == 0 { 1.0 } else { 0.0 };
-                moment(MultiIndex::ZERO) + self.own(kernel, row)? - required
-            }
-        };
-        Ok(worse(defect, zeroth.abs()))
-    }
-
-    /// Bound on the eigenvalues: S_p = sum_q V_q eta (q = p included) for a positive definite kernel of one epsilon
-    /// (errata 26; its matrix K has no negative eigenvalue, so diag(S) - K has none above S), otherwise Gershgorin's
-    /// 2 sum_q V_q |eta|.
-    fn spectral_bound<const D: usize>(&self, row: &Stencil<D>, scratch: &PairScratch<D>) -> Result<f64>
-    where
-        K: Kernel<f64, D>,
-    {
-        let (low, high) = self.epsilon.range();
-        let scale = times(1.0, 1.0 / self.epsilon.get(row.target())?, self.degree as usize);
-        let mut bound = 0.0_f64;
-        for (n, kernel) in self.kernels.iter().enumerate() {
-            let sum = |map: fn(f64) -> f64| -> f64 {
-                let pairs = scratch.volume.iter().enumerate();
-                pairs.map(|(i, volume)| volume * map(scratch.eta[i * N + n])).sum()
-            };
-            let symmetric = self.pairing == Pairing::Difference && low == high;
-            let total = if symmetric && kernel.positive_definite() {
-                sum(|eta| eta) + self.own(kernel, row)?
-            } else if self.pairing == Pairing::Summation {
-                sum(f64::abs) + self.own(kernel, row)?.abs()
-            } else {
-                2.0 * sum(f64::abs)
-            };
-            bound = worse(bound, total * scale);
-        }
-        Ok(bound)
-    }
-
-    /// What the row breaks, overlap before moments: without overlap the moments are no use to anybody.
-    fn breach(&self, h_over_epsilon: f64, defect: f64) -> Option<Breach> {
-        let limit = self.overlap_limit;
-        let (overlap, moments) = (h_over_epsilon <= limit * (1.0 + ROUND_OFF), defect <= self.tolerance);
-        match (overlap, moments) {
-            (false, _) => Some(Breach::Overlap { h_over_epsilon, limit }),
-            (true, false) => Some(Breach::Moment { defect, limit: self.tolerance }),
-            (true, true) => None,
-        }
     }
 }
 
@@ -261,29 +171,6 @@ impl<K, const N: usize> Pairwise<K, N> {
         finite(row, w, diagonal)
     }
 
-    /// What is known of the row just written, see [`Method::report`](super::Method::report).
-    pub(super) fn report<const D: usize>(
-        &self,
-        row: &Stencil<D>,
-        scratch: &PairScratch<D>,
-        w: &[[f64; N]],
-        diagonal: &[f64; N],
-    ) -> Result<RowReport>
-    where
-        K: Kernel<f64, D>,
-    {
-        let mut report = RowReport::of(row, w, diagonal);
-        report.h_over_epsilon = self.h_over_epsilon(row, scratch)?;
-        for n in 0..N {
-            report.moment_defect = worse(report.moment_defect, self.moment_defect(n, row, scratch)?);
-        }
-        report.negative_weights = scratch.eta.iter().filter(|&&eta| eta < 0.0).count();
-        report.spectral_bound = self.spectral_bound(row, scratch)?;
-        report.breach = self.breach(report.h_over_epsilon, report.moment_defect);
-        report.allowed = report.breach.is_some() && self.allowance.covers(row.target());
-        Ok(report)
-    }
-
     /// eta of every output at every neighbor; one output needs no shuffling.
     fn evaluate<const D: usize>(&self, scratch: &mut PairScratch<D>)
     where
@@ -306,14 +193,8 @@ impl<K, const N: usize> Pairwise<K, N> {
 
 /// `value` * `factor`^`count`, one factor at a time, so that a small volume over a small epsilon^D stays in range.
 #[inline(always)]
-fn times(value: f64, factor: f64, count: usize) -> f64 {
+pub(super) fn times(value: f64, factor: f64, count: usize) -> f64 {
     (0..count).fold(value, |product, _| product * factor)
-}
-
-/// The larger of two defects, NaN being the largest of all.
-#[inline(always)]
-fn worse(a: f64, b: f64) -> f64 {
-    if a.is_nan() || a > b { a } else { b }
 }
 
 fn positive(value: f64) -> Result<f64> {
@@ -363,7 +244,7 @@ macro_rules! pairwise_method {
 
             /// The cutoff a provider must be built with: the support radius times the largest epsilon.
             pub fn cutoff(&self) -> Cutoff {
-                self.0.epsilon().cutoff(self.0.support())
+                self.0.epsilon.cutoff(self.0.support)
             }
         }
 
@@ -375,8 +256,12 @@ macro_rules! pairwise_method {
                 Ok(PairScratch::default())
             }
 
+            fn validate(&self, targets: usize, sources: usize) -> Result<()> {
+                self.0.validate(targets, sources)
+            }
+
             fn cutoff(&self, p: usize) -> Result<Option<f64>> {
-                Ok(Some(self.0.epsilon().get(p)? * self.0.support()))
+                Ok(Some(self.0.epsilon.get(p)? * self.0.support))
             }
 
             fn weights(

@@ -33,8 +33,8 @@ pub enum Form {
 /// (Q f)_p = epsilon^-m sum_q V_q (f_q -/+ f_p) eta_epsilon(x_p - x_q), eta_epsilon(x) = epsilon^-D eta(x/epsilon).
 ///
 /// Exact for constants with '-'. The error is O(epsilon^r) + epsilon^(1-m) O((h/epsilon)^s): on lattices the second
-/// part is below round-off from h/epsilon = 1/2 on; **on scattered particles it does not fall with h**, which the
-/// moment check of every row finds. Conserves sum_p V_p (Q f)_p to round-off for one global epsilon ('-' even, '+' odd).
+/// part is below round-off from h/epsilon = 1/2 on; **on scattered particles it does not fall with h**, it grows: by M_1
+/// f'/epsilon for a second derivative, see [`RowReport::lower_moment`](crate::RowReport::lower_moment). Conserves sum_p V_p (Q f)_p to round-off for one global epsilon ('-' even, '+' odd).
 /// Needs volumes. Costs one exponential a pair and output.
 ///
 /// At build every row is checked: h/epsilon against the limit of the kernel (errata 7), and the discrete moments
@@ -95,7 +95,7 @@ impl<K, const N: usize> Pse<K, N> {
     {
         let default = |degree: u32| if degree.is_multiple_of(2) { Pairing::Difference } else { Pairing::Sum };
         let pairwise = Pairwise::new(kernels, epsilon, volumes, default)?;
-        if pairwise.degree() == 0 {
+        if pairwise.degree == 0 {
             return Err(OperatorError::Degree { degree: 0, low: 1 }.into());
         }
         Ok(Self(pairwise))
@@ -108,8 +108,8 @@ impl<K, const N: usize> Pse<K, N> {
     pub fn sign(mut self, sign: Sign) -> Result<Self> {
         self.0.pairing = match sign {
             Sign::Minus => Pairing::Difference,
-            Sign::Plus if self.0.degree().is_multiple_of(2) => {
-                return Err(OperatorError::PlusEven { degree: self.0.degree() }.into());
+            Sign::Plus if self.0.degree.is_multiple_of(2) => {
+                return Err(OperatorError::PlusEven { degree: self.0.degree }.into());
             }
             Sign::Plus => Pairing::Sum,
         };
@@ -122,7 +122,7 @@ impl<K, const N: usize> Pse<K, N> {
     /// [`OperatorError::VariableEpsilon`] for strengths with an epsilon that varies: the exchange between two
     /// particles would then not be one number.
     pub fn form(mut self, form: Form) -> Result<Self> {
-        let (low, high) = self.0.epsilon().range();
+        let (low, high) = self.0.epsilon.range();
         if form == Form::Strengths && low != high {
             return Err(OperatorError::VariableEpsilon { low, high }.into());
         }

@@ -91,7 +91,7 @@ pub enum SphForm {
 ///
 /// With degree 0 and targets of the caller's choice it is the smooth approximation of the field (eq. 5.7). The error
 /// is O(epsilon^r) + epsilon^-m O((h/epsilon)^s) (errata 9): on lattices of fixed overlap it converges with r until
-/// the second part shows, **on scattered particles it does not converge**, which the moment check finds. Does not
+/// the second part shows, **on scattered particles it does not converge**, which the checks of the rows show. Does not
 /// conserve. Needs volumes. Rows are checked as those of [`Pse`](super::Pse); in the summation form also M_0.
 ///
 /// ```
@@ -139,7 +139,7 @@ impl<W, const D: usize, const N: usize> Sph<W, D, N> {
     pub fn form(mut self, form: SphForm) -> Result<Self> {
         self.0.pairing = match form {
             SphForm::Summation => Pairing::Summation,
-            SphForm::Difference if self.0.degree() == 0 => {
+            SphForm::Difference if self.0.degree == 0 => {
                 return Err(OperatorError::Degree { degree: 0, low: 1 }.into());
             }
             SphForm::Difference => Pairing::Difference,
