@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::assemble::Worker;
-use super::blocks::{BLOCK, each_block};
+use super::blocks::{BLOCK, each_block, each_part};
 use super::{Apply, Field, Report, check, check_results};
 use crate::error::Result;
 use crate::neighbors::Neighbors;
@@ -12,7 +12,8 @@ use crate::operator::Method;
 /// A method over a provider, applied without stored weights; the same bits as the stored rows.
 ///
 /// All rows are checked once when it is made. An application costs the weights anew: about four times the cost of
-/// stored rows for a Gaussian. It allocates nothing after the first application of as many threads.
+/// stored rows for a Gaussian. It allocates nothing after the first application of as many threads, but what the pool of
+/// the feature `rayon` does.
 pub struct MatrixFree<'a, const D: usize, M: Method<D>, P> {
     method: &'a M,
     neighbors: &'a P,
@@ -76,10 +77,10 @@ where
 
     fn apply(&self, f: &[T], out: &mut [T]) -> Result<()> {
         check(f.as_chunks::<1>().0, self.neighbors.sources(), out, self.neighbors.targets())?;
-        each_block(out.chunks_mut(BLOCK).enumerate(), |(b, out)| {
+        each_part(out, |first, out| {
             self.with_worker(|worker| {
-                for (i, out) in out.iter_mut().enumerate() {
-                    worker.fill(self.method, self.neighbors, b * BLOCK + i)?;
+                for (p, out) in (first..).zip(out) {
+                    worker.fill(self.method, self.neighbors, p)?;
                     *out = worker.apply(f);
                 }
                 Ok(())
