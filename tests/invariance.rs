@@ -30,6 +30,9 @@ struct Choice {
     order: u32,
 }
 
+/// eta, to be evaluated at many points.
+type Profile = Box<dyn Fn(&[f64; 2]) -> f64>;
+
 impl Choice {
     fn degree(&self) -> i32 {
         i32::from(self.beta[0] + self.beta[1])
@@ -55,8 +58,7 @@ impl Choice {
         if self.sph { self.second } else { !(self.second && self.degree() % 2 == 1) }
     }
 
-    /// eta, to be evaluated at many points.
-    fn kernel(&self) -> Box<dyn Fn(&[f64; 2]) -> f64> {
+    fn kernel(&self) -> Profile {
         let index = MultiIndex::new(self.beta);
         if self.sph {
             let kernel = HighOrderGaussian::<2>::new(self.order).unwrap();

@@ -5,9 +5,11 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use parops::{
-    Allowance, Apply, CellList, Domain, Epsilon, Euler, Gradient, Laplacian, Leapfrog, Method, NeighborList, Neighbors,
-    Particles, Pse, Rk4, Rows, Sph, Stencil, Stepper,
+    Allowance, CellList, Domain, Epsilon, Euler, Gradient, Laplacian, Leapfrog, Method, Neighbors, Particles, Pse, Rk4,
+    Sph, Stencil, Stepper,
 };
+#[cfg(not(feature = "rayon"))]
+use parops::{Apply, NeighborList, Rows};
 
 struct Counting;
 
