@@ -23,6 +23,20 @@ const UNEQUAL: &str = "a sum of differential operators must have one degree: its
 const THREE_EXPONENTS: &str = "this multi-index does not have 3 exponents, so it is no derivative in 3 dimensions";
 const TAKES: &str = "fn takes(_: impl Operator<3>) {}";
 
+const IN_TWO: &str = "is no provider of neighbors in 2 dimensions";
+const OPERATOR_OF_TWO: &str = "
+            fn pse() -> Pse<Exchange<2>> {
+                Pse::new(Laplacian::<2>, 2, Epsilon::global(0.1).unwrap(), &Volumes::equal(0.01).unwrap()).unwrap()
+            }
+            fn sph() -> Sph<Gaussian<2>, 2> {
+                let volumes = Volumes::equal(0.01).unwrap();
+                Sph::new(Laplacian::<2>, Gaussian::<2>::new(), Epsilon::global(0.1).unwrap(), &volumes).unwrap()
+            }
+            fn cells<const D: usize>() -> CellList<D> {
+                let particles = Particles::new(vec![[0.0; D]]).unwrap();
+                CellList::build(&particles, &Domain::open(), Cutoff(0.6)).unwrap()
+            }";
+
 const CASES: &[Case] = &[
     Case {
         name: "sum_of_unequal_degree",
@@ -97,6 +111,48 @@ const CASES: &[Case] = &[
             fn takes(_: &impl Neighbors<2>) {}",
         bad: "takes(&Nobody::<3>);",
         good: "takes(&Nobody::<2>);",
+    },
+    Case {
+        name: "rows_of_another_dimension",
+        sentence: "Exchange<2>` is no kernel in 3 dimensions",
+        shared: OPERATOR_OF_TWO,
+        bad: "let _ = Rows::<[f64; 1]>::assemble::<3, _, _>(&pse(), &cells::<3>());",
+        good: "let _ = Rows::<[f64; 1]>::assemble::<2, _, _>(&pse(), &cells::<2>());",
+    },
+    Case {
+        name: "smoothing_kernel_of_another_dimension",
+        sentence: "is no smoothing kernel in 3 dimensions",
+        shared: "fn takes(_: impl SmoothingKernel<f64, 3>) {}",
+        bad: "takes(Gaussian::<2>::new());",
+        good: "takes(Gaussian::<3>::new());",
+    },
+    Case {
+        name: "rows_over_a_provider_of_another_dimension",
+        sentence: IN_TWO,
+        shared: OPERATOR_OF_TWO,
+        bad: "let _ = Rows::<[f64; 1]>::assemble(&pse(), &cells::<3>());",
+        good: "let _ = Rows::<[f64; 1]>::assemble(&pse(), &cells::<2>());",
+    },
+    Case {
+        name: "assembled_over_a_provider_of_another_dimension",
+        sentence: IN_TWO,
+        shared: OPERATOR_OF_TWO,
+        bad: "let _ = pse().assemble(&cells::<3>());",
+        good: "let _ = pse().assemble(&cells::<2>());",
+    },
+    Case {
+        name: "matrix_free_over_a_provider_of_another_dimension",
+        sentence: IN_TWO,
+        shared: OPERATOR_OF_TWO,
+        bad: "let _ = pse().matrix_free(&cells::<3>()).is_ok();",
+        good: "let _ = pse().matrix_free(&cells::<2>()).is_ok();",
+    },
+    Case {
+        name: "sph_over_a_provider_of_another_dimension",
+        sentence: IN_TWO,
+        shared: OPERATOR_OF_TWO,
+        bad: "let _ = sph().assemble(&cells::<3>());",
+        good: "let _ = sph().assemble(&cells::<2>());",
     },
 ];
 

@@ -239,7 +239,7 @@ fn weights_beyond_f32_are_refused_where_they_are_rounded() -> Result<()> {
     assert!(matches!(*error.kind(), ErrorKind::Operator(OperatorError::Weight { weight: f64::INFINITY, .. })));
     // Without stored weights the same shows in the result.
     let f: Vec<f32> = (0..30_u8).map(f32::from).collect();
-    let error = pse.matrix_free(&neighbors)?.apply(&f, &mut vec![0.0_f32; 30]).unwrap_err();
+    let error = pse.matrix_free(&neighbors)?.apply(&f, &mut [0.0_f32; 30]).unwrap_err();
     assert!(matches!(*error.kind(), ErrorKind::Apply(ApplyError::Overflow { .. })));
     Ok(())
 }

@@ -4,7 +4,12 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use parops::{Euler, Leapfrog, Rk4, Stepper};
+use parops::{
+    Allowance, CellList, Domain, Epsilon, Euler, Gradient, Laplacian, Leapfrog, Method, Neighbors, Particles, Pse, Rk4,
+    Sph, Stencil, Stepper,
+};
+#[cfg(not(feature = "rayon"))]
+use parops::{Apply, NeighborList, Rows};
 
 struct Counting;
 
@@ -71,4 +76,85 @@ fn steps_after_the_first_allocate_nothing() {
         stepper.reset();
         assert_eq!(allocations(|| steps(&mut *stepper, 0.0, 0.05, 10)), 0);
     }
+}
+
+/// A scattered set, so that rows differ in length, with more than one block of rows.
+fn particles() -> (Particles<2>, Domain<2>) {
+    let particles = Particles::jittered([0.0; 2], [1.0; 2], [30; 2], 0.4, 3).unwrap();
+    (particles, Domain::periodic([0.0; 2], [1.0; 2]).unwrap())
+}
+
+fn laplacian(particles: &Particles<2>) -> Pse<parops::Exchange<2>> {
+    let epsilon = Epsilon::global(2.0 / 30.0).unwrap();
+    let pse = Pse::new(Laplacian::<2>, 2, epsilon, particles.volumes().unwrap()).unwrap();
+    pse.support(3.0).unwrap().allow(Allowance::Everywhere)
+}
+
+#[test]
+fn weights_into_given_scratch_allocate_nothing_once_a_row_of_that_size_was_made() {
+    let (particles, domain) = particles();
+    let pse = laplacian(&particles);
+    let sph = Sph::new(
+        Gradient::<2>,
+        parops::Gaussian::new(),
+        Epsilon::global(2.0 / 30.0).unwrap(),
+        particles.volumes().unwrap(),
+    );
+    let sph = sph.unwrap().support(3.0).unwrap().allow(Allowance::Everywhere);
+    let neighbors = CellList::build(&particles, &domain, pse.cutoff()).unwrap();
+    let rows = count_weights(&pse, &neighbors);
+    assert!(rows > 0);
+    assert_eq!(rows, count_weights(&sph, &neighbors));
+}
+
+/// Makes the longest row, then all of them, and returns how many were made without an allocation: all.
+fn count_weights<M: Method<2>>(method: &M, neighbors: &CellList<2>) -> usize {
+    let cutoff = neighbors.reach();
+    let longest = (0..neighbors.targets()).max_by_key(|&p| neighbors.count(p, cutoff)).unwrap();
+    let mut row = Stencil::default();
+    let mut scratch = method.scratch().unwrap();
+    let mut weights = vec![<M::Out as parops::Outputs>::ZERO; neighbors.count(longest, cutoff)];
+    let mut diagonal = <M::Out as parops::Outputs>::ZERO;
+    let mut make = |p: usize| {
+        neighbors.gather(p, cutoff, &mut row);
+        let weights = &mut weights[..row.len()];
+        method.weights(&row, &mut scratch, weights, &mut diagonal).unwrap();
+        std::hint::black_box(method.report(&row, &scratch, weights, &diagonal).unwrap());
+    };
+    make(longest);
+    let count = allocations(|| (0..neighbors.targets()).for_each(&mut make));
+    assert_eq!(count, 0);
+    neighbors.targets()
+}
+
+/// Under the feature `rayon` the pool's own queues allocate.
+#[cfg(not(feature = "rayon"))]
+#[test]
+fn applying_stored_rows_allocates_nothing_and_matrix_free_nothing_after_the_first_time() {
+    let (particles, domain) = particles();
+    let (n, pse) = (particles.len(), laplacian(&particles));
+    let neighbors = CellList::build(&particles, &domain, pse.cutoff()).unwrap();
+    let list = NeighborList::from_provider(&neighbors).unwrap();
+    let (f, mut out) = (vec![1.0; n], vec![0.0; n]);
+    let (f32s, mut short) = (vec![1.0_f32; n], vec![0.0_f32; n]);
+    let rows = pse.assemble(&neighbors).unwrap();
+    let single = Rows::<_, f32>::assemble(&pse, &neighbors).unwrap();
+    assert_eq!(allocations(|| rows.apply(&f, &mut out).unwrap()), 0);
+    assert_eq!(allocations(|| single.apply(&f32s, &mut short).unwrap()), 0);
+    assert_eq!(allocations(|| assert!(rows.apply(&f[1..], &mut out).is_err())), 0);
+
+    let gradient = Pse::new(Gradient::<2>, 2, Epsilon::global(2.0 / 30.0).unwrap(), particles.volumes().unwrap());
+    let gradient = gradient.unwrap().support(3.0).unwrap().allow(Allowance::Everywhere).assemble(&neighbors).unwrap();
+    let mut outs = vec![[0.0; 2]; n];
+    assert_eq!(allocations(|| gradient.apply_all(&f, &mut outs).unwrap()), 0);
+    assert_eq!(allocations(|| gradient.apply_dot(&outs, &mut out).unwrap()), 0);
+    assert_eq!(allocations(|| gradient.apply_along(&outs, &f, &mut out).unwrap()), 0);
+
+    let (cells, listed) = (pse.matrix_free(&neighbors).unwrap(), pse.matrix_free(&list).unwrap());
+    let free: [&dyn Apply<f64>; 2] = [&cells, &listed];
+    for operator in free {
+        operator.apply(&f, &mut out).unwrap();
+        assert_eq!(allocations(|| operator.apply(&f, &mut out).unwrap()), 0);
+    }
+    assert_eq!(allocations(|| cells.apply(&f32s, &mut short).unwrap()), 0);
 }

@@ -24,6 +24,25 @@ pub(super) fn each_block<B: Send, R: Send>(
     blocks.map(work).collect()
 }
 
+/// Does every block of an output, given its first row; allocates nothing but what the pool itself does.
+///
+/// # Errors
+/// As [`each_block`].
+pub(super) fn each_part<T: Send>(
+    out: &mut [T],
+    work: impl Fn(usize, &mut [T]) -> Result<()> + Sync + Send,
+) -> Result<()> {
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        // The reduction keeps the order of the blocks.
+        let done = out.par_chunks_mut(BLOCK).enumerate().map(|(b, out)| work(b * BLOCK, out));
+        done.reduce(|| Ok(()), Result::and)
+    }
+    #[cfg(not(feature = "rayon"))]
+    out.chunks_mut(BLOCK).enumerate().try_for_each(|(b, out)| work(b * BLOCK, out))
+}
+
 /// Applies row after row to an output, block by block.
 pub(super) fn each_row<T: Send>(out: &mut [T], row: impl Fn(usize) -> T + Sync + Send) {
     let block = |(b, out): (usize, &mut [T])| {

@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::assemble::Worker;
-use super::blocks::{BLOCK, each_block};
+use super::blocks::{BLOCK, each_block, each_part};
 use super::sweep::Sweep;
 use super::{Apply, Field, Report, check, check_results, scalars};
 use crate::error::Result;
@@ -13,7 +13,8 @@ use crate::operator::Method;
 /// A method over a provider, applied without stored weights; the same bits as the stored rows.
 ///
 /// All rows are checked once when it is made. An application costs the weights anew: about four times the cost of
-/// stored rows for a Gaussian. It allocates nothing after the first application of as many threads.
+/// stored rows for a Gaussian. It allocates nothing after the first application of as many threads, but what the pool of
+/// the feature `rayon` does.
 pub struct MatrixFree<'a, const D: usize, M: Method<D>, P> {
     method: &'a M,
     neighbors: &'a P,
@@ -66,17 +67,15 @@ impl<'a, const D: usize, M: Method<D>, P: Neighbors<D>> MatrixFree<'a, D, M, P> 
 impl<const D: usize, const K: usize, M: Method<D, Out = [f64; K]>, P: Neighbors<D>> MatrixFree<'_, D, M, P> {
     /// Fills row after row and hands each to `row`, which gives its result.
     fn each<T: Send>(&self, out: &mut [T], row: impl Fn(usize, &Worker<D, M>) -> T + Sync + Send) -> Result<()> {
-        each_block(out.chunks_mut(BLOCK).enumerate(), |(b, out)| {
+        each_part(out, |first, out| {
             self.with_worker(|worker| {
-                for (i, out) in out.iter_mut().enumerate() {
-                    let p = b * BLOCK + i;
+                for (p, out) in (first..).zip(out) {
                     worker.fill(self.method, self.neighbors, p)?;
                     *out = row(p, worker);
                 }
                 Ok(())
             })
-        })?;
-        Ok(())
+        })
     }
 
     /// All K outputs of a scalar field, as [`Rows::apply_all`](super::Rows::apply_all).

@@ -30,6 +30,11 @@ use crate::scalar::Scalar;
 /// `parops::testing::check_kernel` (feature `testing`) tells whether it keeps its promises.
 ///
 /// Source: notes 001, eq. 5.30; notes 000, eq. 16 and 18; errata 10 for the argument.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is no kernel in {D} dimensions",
+    label = "expected a kernel in {D} dimensions",
+    note = "the kernel, the operator, the particles and the provider must agree on the number of dimensions"
+)]
 pub trait Kernel<T: Scalar, const D: usize>: Send + Sync {
     /// eta(z).
     fn value(&self, z: &[T; D]) -> T;
@@ -63,6 +68,11 @@ pub trait Kernel<T: Scalar, const D: usize>: Send + Sync {
 /// A smoothing kernel W: even, Int W = 1, differentiable.
 ///
 /// Source: notes 001, sec. 5.1.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is no smoothing kernel in {D} dimensions",
+    label = "expected a smoothing kernel in {D} dimensions",
+    note = "the kernel, the operator, the particles and the provider must agree on the number of dimensions"
+)]
 pub trait SmoothingKernel<T: Scalar, const D: usize>: Kernel<T, D> {
     /// D^beta W(z).
     ///
