@@ -53,6 +53,14 @@ impl<const D: usize> Stencil<D> {
         self.signs.push(neighbor.sign);
     }
 
+    /// Adds as many sources as separations, of sign +1; room is made once.
+    #[inline(always)]
+    pub(crate) fn extend(&mut self, sources: impl Iterator<Item = u32>, separations: impl Iterator<Item = [f64; D]>) {
+        self.sources.extend(sources);
+        self.separations.extend(separations);
+        self.signs.resize(self.sources.len(), 1);
+    }
+
     /// Index p of the target.
     pub fn target(&self) -> usize {
         self.target

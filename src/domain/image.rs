@@ -99,6 +99,17 @@ impl<const D: usize> Domain<D> {
         if odd.count() % 2 == 0 { 1 } else { -1 }
     }
 
+    /// The points farther than `reach` from every face that casts images lie between these, axis by axis.
+    pub(crate) fn inner(&self, reach: f64) -> [[f64; 2]; D] {
+        std::array::from_fn(|axis| {
+            let [lower, upper] = self.faces[axis].map(|face| face != Face::Open);
+            [
+                if lower { self.lower[axis] + reach } else { f64::NEG_INFINITY },
+                if upper { self.upper[axis] - reach } else { f64::INFINITY },
+            ]
+        })
+    }
+
     /// A bound on the magnitude of every face that casts images, zero for open space.
     pub(crate) fn magnitude(&self) -> f64 {
         let faces = self.faces.iter().flatten();

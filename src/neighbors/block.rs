@@ -33,10 +33,6 @@ impl<const D: usize> Block<D> {
         self.ends.push(self.neighbors.len());
     }
 
-    pub(super) fn is_full(&self) -> bool {
-        self.ends.len() >= Self::ROWS
-    }
-
     pub(super) fn total(&self) -> usize {
         self.neighbors.len()
     }
@@ -69,7 +65,7 @@ impl<const D: usize> Block<D> {
     }
 }
 
-fn exact<T: Copy>(entries: &[T]) -> Result<Vec<T>> {
+pub(super) fn exact<T: Copy>(entries: &[T]) -> Result<Vec<T>> {
     let mut copy = reserved(entries.len())?;
     copy.extend_from_slice(entries);
     Ok(copy)

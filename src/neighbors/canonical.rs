@@ -1,6 +1,7 @@
 //! A provider whose rows are sorted by separation, whatever the provider beneath.
 
-use super::Neighbors;
+use super::{NeighborList, Neighbors};
+use crate::error::Result;
 use crate::stencil::{Neighbor, Stencil};
 
 /// The neighbors of another provider, each row sorted by separation; see [`Neighbors::canonical`].
@@ -92,5 +93,9 @@ impl<P: Neighbors<D>, const D: usize> Neighbors<D> for &P {
 
     fn count(&self, p: usize, cutoff: f64) -> usize {
         (**self).count(p, cutoff)
+    }
+
+    fn stored(&self) -> Result<NeighborList<D>> {
+        (**self).stored()
     }
 }

@@ -99,9 +99,13 @@ impl<const D: usize> Grid<D> {
                 gap += self.gap_squared(axis, cell[axis], point[axis]);
             }
             for number in low[inner]..=high[inner] {
-                if gap + self.gap_squared(inner, number, point[inner]) <= limit {
+                let chord = limit - (gap + self.gap_squared(inner, number, point[inner]));
+                if chord >= 0.0 {
                     cell[inner] = number;
-                    visit(&cell, high[D - 1]);
+                    // Slack again, for the rounding of the root and the ends.
+                    let half = chord.sqrt() + self.slack;
+                    cell[D - 1] = self.number(D - 1, point[D - 1] - half);
+                    visit(&cell, self.number(D - 1, point[D - 1] + half));
                 }
             }
             let Some(axis) = (0..outer).rev().find(|&axis| cell[axis] < high[axis]) else {

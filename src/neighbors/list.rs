@@ -1,7 +1,10 @@
 //! Stored rows: those of another provider, or the user's own after every check.
 
+use std::sync::Arc;
+
 use super::Neighbors;
 use super::block::Block;
+use super::links::Links;
 use super::placed::{Placed, check_cutoff, distance_squared};
 use super::row_check::{check_offsets, check_row};
 use crate::domain::{Domain, Image};
@@ -10,8 +13,10 @@ use crate::particles::{PARTICLES_HIGH, Particles, check_count, reserved};
 use crate::scale::Cutoff;
 use crate::stencil::{Neighbor, Stencil};
 
-/// A provider that holds its rows: about 29 bytes a neighbor in three dimensions, and no search in a query.
+/// A provider that holds its rows: no search in a query.
 ///
+/// Rows of a [`CellList`](crate::CellList) take 4 bytes a neighbor (6 near boundaries) and share its points, from which
+/// separations are measured again; other rows keep them, 29 bytes a neighbor in three dimensions.
 /// Queries with a smaller cutoff filter the row; the order of a row is that in which it was given.
 ///
 /// ```
@@ -31,7 +36,13 @@ pub struct NeighborList<const D: usize> {
     cutoffs: Vec<f64>,
     reach: f64,
     generation: u64,
-    blocks: Vec<Block<D>>,
+    rows: Rows<D>,
+}
+
+#[derive(Clone, Debug)]
+enum Rows<const D: usize> {
+    Measured(Vec<Block<D>>),
+    Linked(Arc<Placed<D>>, Vec<Links>),
 }
 
 const NONE: u32 = u32::MAX;
@@ -42,14 +53,41 @@ impl<const D: usize> NeighborList<D> {
     /// # Errors
     /// [`ParticleError::TooMany`](crate::ParticleError::TooMany), [`ParticleError::Memory`](crate::ParticleError::Memory) where the list does not fit.
     pub fn from_provider(provider: &impl Neighbors<D>) -> Result<Self> {
+        provider.stored()
+    }
+
+    /// Rows with their separations and signs.
+    pub(super) fn measured(provider: &impl Neighbors<D>) -> Result<Self> {
         let (targets, reach) = (provider.targets(), provider.reach());
         let mut list = Self::with_room(targets, provider.sources(), reach, provider.generation())?;
         list.owned = provider.owned();
+        let mut blocks = reserved(targets.div_ceil(Block::<D>::ROWS))?;
         let mut block = Block::empty();
         for p in 0..targets {
             provider.for_each(p, reach, |neighbor| block.push(neighbor));
-            list.end_row(p + 1 == targets, &mut block, provider.center(p), provider.cutoff(p))?;
+            block.end_row();
+            if list.end_row(targets, provider.center(p), provider.cutoff(p)) {
+                blocks.push(block.pack()?);
+            }
         }
+        list.rows = Rows::Measured(blocks);
+        Ok(list)
+    }
+
+    /// Rows of indices over these points; `fill(p, links)` adds the neighbors of p up to the cutoff.
+    pub(super) fn linked(placed: &Arc<Placed<D>>, mut fill: impl FnMut(usize, &mut Links)) -> Result<Self> {
+        let targets = placed.targets().len();
+        let mut list = Self::with_room(targets, placed.sources.len(), placed.cutoff, placed.generation)?;
+        let mut blocks = reserved(targets.div_ceil(Block::<D>::ROWS))?;
+        let mut links = Links::default();
+        for p in 0..targets {
+            fill(p, &mut links);
+            links.end_row();
+            if list.end_row(targets, placed.center(p), placed.cutoff) {
+                blocks.push(links.pack()?);
+            }
+        }
+        list.rows = Rows::Linked(Arc::clone(placed), blocks);
         Ok(list)
     }
 
@@ -81,6 +119,7 @@ impl<const D: usize> NeighborList<D> {
         check_cutoff(cutoff)?;
         check_offsets(offsets, centers.len(), neighbors.len())?;
         let mut list = Self::with_room(centers.len(), sources, cutoff.0, generation)?;
+        let mut blocks = reserved(centers.len().div_ceil(Block::<D>::ROWS))?;
         let mut block = Block::empty();
         for (p, &center) in centers.iter().enumerate() {
             let row = &neighbors[offsets[p]..offsets[p + 1]];
@@ -89,8 +128,12 @@ impl<const D: usize> NeighborList<D> {
             }
             check_row(sources, center, row, cutoff.0).map_err(|error| error.at(p))?;
             row.iter().for_each(|&neighbor| block.push(neighbor));
-            list.end_row(p + 1 == centers.len(), &mut block, center, cutoff.0)?;
+            block.end_row();
+            if list.end_row(centers.len(), center, cutoff.0) {
+                blocks.push(block.pack()?);
+            }
         }
+        list.rows = Rows::Measured(blocks);
         Ok(list)
     }
 
@@ -136,31 +179,24 @@ impl<const D: usize> NeighborList<D> {
 
     /// How many neighbors all rows hold together.
     pub fn total(&self) -> usize {
-        self.blocks.iter().map(Block::total).sum()
+        match &self.rows {
+            Rows::Measured(blocks) => blocks.iter().map(Block::total).sum(),
+            Rows::Linked(_, blocks) => blocks.iter().map(Links::total).sum(),
+        }
     }
 
     fn with_room(targets: usize, sources: usize, reach: f64, generation: u64) -> Result<Self> {
         check_count(sources, PARTICLES_HIGH)?;
         let (centers, cutoffs) = (reserved(targets)?, reserved(targets)?);
-        let blocks = reserved(targets.div_ceil(Block::<D>::ROWS))?;
-        Ok(Self { sources, owned: sources, centers, cutoffs, reach, generation, blocks })
+        Ok(Self { sources, owned: sources, centers, cutoffs, reach, generation, rows: Rows::Measured(Vec::new()) })
     }
 
-    fn end_row(&mut self, last: bool, block: &mut Block<D>, center: Option<usize>, cutoff: f64) -> Result<()> {
+    /// Notes center and cutoff of the next target; whether a block of rows ends here.
+    fn end_row(&mut self, targets: usize, center: Option<usize>, cutoff: f64) -> bool {
         self.centers.push(center.map_or(NONE, |q| q as u32));
         self.cutoffs.push(cutoff);
-        block.end_row();
-        if last || block.is_full() {
-            self.blocks.push(block.pack()?);
-        }
-        Ok(())
-    }
-
-    #[inline(always)]
-    fn within(&self, p: usize, cutoff: f64) -> impl Iterator<Item = Neighbor<D>> + '_ {
-        let rows = Block::<D>::ROWS;
-        let block = self.blocks.get(p / rows).filter(|_| cutoff >= 0.0);
-        block.into_iter().flat_map(move |block| block.row(p % rows, cutoff, cutoff >= self.reach))
+        let rows = self.centers.len();
+        rows == targets || rows.is_multiple_of(Block::<D>::ROWS)
     }
 }
 
@@ -193,16 +229,29 @@ impl<const D: usize> Neighbors<D> for NeighborList<D> {
         self.generation
     }
 
-    fn for_each(&self, p: usize, cutoff: f64, visit: impl FnMut(Neighbor<D>)) {
-        self.within(p, cutoff).for_each(visit);
+    fn for_each(&self, p: usize, cutoff: f64, mut visit: impl FnMut(Neighbor<D>)) {
+        let (block, row) = (p / Block::<D>::ROWS, p % Block::<D>::ROWS);
+        let whole = cutoff >= self.reach;
+        match &self.rows {
+            _ if !(cutoff >= 0.0) => {}
+            Rows::Measured(blocks) => {
+                blocks.get(block).into_iter().for_each(|block| block.row(row, cutoff, whole).for_each(&mut visit));
+            }
+            Rows::Linked(placed, blocks) => {
+                blocks.get(block).into_iter().for_each(|links| links.visit(placed, p, cutoff, whole, &mut visit));
+            }
+        }
     }
 
     fn gather(&self, p: usize, cutoff: f64, row: &mut Stencil<D>) {
         row.reset(p, self.center(p), cutoff);
-        self.within(p, cutoff).for_each(|neighbor| row.push(neighbor));
-    }
-
-    fn count(&self, p: usize, cutoff: f64) -> usize {
-        self.within(p, cutoff).count()
+        match &self.rows {
+            Rows::Linked(placed, blocks) if cutoff >= 0.0 => {
+                if let Some(links) = blocks.get(p / Block::<D>::ROWS) {
+                    links.gather(placed, p, cutoff, cutoff >= self.reach, row);
+                }
+            }
+            _ => self.for_each(p, cutoff, |neighbor| row.push(neighbor)),
+        }
     }
 }

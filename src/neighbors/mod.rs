@@ -5,6 +5,7 @@ mod brute_force;
 mod canonical;
 mod cell_list;
 mod grid;
+mod links;
 mod list;
 mod measure;
 mod order;
@@ -18,6 +19,7 @@ pub use cell_list::CellList;
 pub use list::NeighborList;
 pub use measure::{epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors};
 
+use crate::error::Result;
 use crate::stencil::{Neighbor, Stencil};
 
 /// Answers, for every target p, which source particles (or images of them) lie within a cutoff.
@@ -77,6 +79,18 @@ pub trait Neighbors<const D: usize>: Sync {
         let mut count = 0;
         self.for_each(p, cutoff, |_| count += 1);
         count
+    }
+
+    /// All rows up to the reach, stored: what [`NeighborList::from_provider`] returns. A provider that knows a shorter
+    /// form of its rows overrides it.
+    ///
+    /// # Errors
+    /// As [`NeighborList::from_provider`].
+    fn stored(&self) -> Result<NeighborList<D>>
+    where
+        Self: Sized,
+    {
+        NeighborList::measured(self)
     }
 
     /// The same neighbors with every row sorted by separation, so that sums over a row do not depend on the provider,

@@ -5,6 +5,7 @@ use crate::error::{NeighborError, Result};
 use crate::particles::{PARTICLES_HIGH, Particles, check_count, check_points, reserved};
 use crate::scalar::square;
 use crate::scale::Cutoff;
+use crate::stencil::Neighbor;
 
 /// Sources and targets wrapped into the box, and the cutoff r_c that provider and domain agree on.
 #[derive(Clone, Debug)]
@@ -57,6 +58,20 @@ impl<const D: usize> Placed<D> {
     pub(super) fn separation(&self, image: Image, target: &[f64; D], q: usize) -> [f64; D] {
         self.domain.separation(image, target, &self.sources[q])
     }
+
+    /// An image of source q as a neighbor.
+    #[inline(always)]
+    pub(super) fn neighbor(&self, image: Image, target: &[f64; D], q: u32) -> Neighbor<D> {
+        let (q, own) = (q as usize, image == Image::OWN);
+        let separation = if own { difference(target, &self.sources[q]) } else { self.separation(image, target, q) };
+        Neighbor { q, separation, sign: if own { 1 } else { self.domain.sign(image) } }
+    }
+}
+
+/// x_p - x_q, the separation to a source that is no image.
+#[inline(always)]
+pub(super) fn difference<const D: usize>(target: &[f64; D], source: &[f64; D]) -> [f64; D] {
+    std::array::from_fn(|axis| target[axis] - source[axis])
 }
 
 /// cutoff^2, the right-hand side of |separation|^2 <= cutoff^2: one expression for all providers, so that ties at
