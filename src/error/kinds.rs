@@ -95,13 +95,20 @@ kinds! {
             /// Highest degree the kernel is differentiable to.
             limit: u32,
         } => "the kernel has derivatives to degree {limit}, not {degree}",
-        /// A support radius or overlap limit that is not positive and finite.
+        /// A support radius or overlap limit that is not positive and finite, or whose square or volume is not.
         Radii {
             /// Support, in units of epsilon.
             support: f64,
             /// Largest h / epsilon.
             overlap_limit: f64,
-        } => "support {support} and overlap limit {overlap_limit} must be positive and finite",
+        } => "support {support} and overlap limit {overlap_limit} must be positive and finite, the volume within too",
+        /// A quadrature of too many points.
+        Points {
+            /// Number of points.
+            points: f64,
+            /// Largest legal number.
+            limit: f64,
+        } => "a quadrature of {points:e} points is beyond the {limit:e} allowed",
     }
 }
 
