@@ -502,3 +502,15 @@ fn kernels_of_different_degree_make_no_operator() {
         ErrorKind::MultiIndex(parops::MultiIndexError::UnequalDegree { first: 2, other: 1 })
     ));
 }
+
+#[test]
+fn allowance_covers_its_targets_in_any_order() {
+    for targets in [vec![9, 5, 1], vec![1, 5, 9], vec![5, 9, 5, 1, 9]] {
+        let allowance = Allowance::at(targets);
+        let covered: Vec<_> = (0..12).filter(|&p| allowance.covers(p)).collect();
+        assert_eq!(covered, [1, 5, 9]);
+        assert_eq!(allowance, Allowance::at([1, 5, 9]));
+    }
+    assert!((0..12).all(|p| Allowance::Everywhere.covers(p) && !Allowance::Nowhere.covers(p)));
+    assert!(!Allowance::at([]).covers(0));
+}

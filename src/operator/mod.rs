@@ -9,7 +9,7 @@ mod sph;
 mod typed;
 
 pub use expression::{Expression, Operator, Outputs, ShowSum, Value};
-pub use method::{Allowance, Breach, Method, RowReport, spread};
+pub use method::{Allowance, Breach, Method, RowReport, Targets, spread};
 pub use named::{Along, Divergence, Gradient, Laplacian};
 pub use pairwise::{MOMENT_TOLERANCE, PairScratch};
 pub use pse::{Form, Pse, Sign};
