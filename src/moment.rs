@@ -88,8 +88,8 @@ pub fn continuous_moment<const D: usize>(
 ///
 /// # Errors
 /// [`KernelError::Radii`] where the support R or the overlap limit is not positive and finite, or (3.5 R)^max(D, 2) is
-/// not, or the finest spacing underflows; [`KernelError::Points`] where a lattice of 2^24 points is too coarse, which
-/// takes at least 11 dimensions.
+/// not, or the finest spacing underflows; [`KernelError::Points`] where the finest lattice has more than 2^24 points,
+/// which takes at least 11 dimensions.
 pub fn continuous_moments<const D: usize>(
     kernel: &(impl Kernel<f64, D> + ?Sized),
     alphas: &[MultiIndex<D>],

@@ -1,5 +1,7 @@
 //! Kernels: exact derivation, values, derivatives, scalars, limits.
 
+use std::time::{Duration, Instant};
+
 use num_dual::Dual64;
 use parops::{
     Error, ErrorKind, ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, KernelError, MultiIndex,
@@ -253,6 +255,38 @@ fn beyond_the_degree_limit_overflow_is_a_typed_error() {
     }
     assert!(refused > 200, "{refused}");
     assert!(Exchange::new(&one([255, 255, 255]), 2).is_err());
+}
+
+#[test]
+fn derivations_of_too_many_monomials_are_refused_at_once() {
+    fn refused<const D: usize>(exponents: [u8; D]) {
+        let start = Instant::now();
+        let error = Exchange::new(&one(exponents), 8).expect_err("too many");
+        let degree = MultiIndex::new(exponents).degree();
+        assert_eq!(kind(error), ErrorKind::Kernel(KernelError::Overflow { degree, order: 8 }));
+        assert!(start.elapsed() < Duration::from_secs(1), "{exponents:?}: {:?}", start.elapsed());
+    }
+    refused([14; 4]);
+    refused([42; 6]);
+    refused([255; 6]);
+    refused([255; 3]);
+    // Every monomial of the limit at once, in all four parities: C(43, 2) = 903 of them.
+    let limit = Exchange::<3>::DEGREE_LIMIT;
+    let all: Vec<_> = graded::<3>(limit, limit).map(|index| Term { index, factor: 1.0 }).collect();
+    assert_eq!(all.len(), 903);
+    assert!(Exchange::new(&all, 2).is_ok());
+}
+
+#[test]
+fn derivations_at_the_monomial_limit_end_soon() {
+    // The highest degrees within the limit, all of even parity: 969, 715 and 792 monomials.
+    let start = Instant::now();
+    let results = [
+        Exchange::new(&one([8; 4]), 8).map(|_| ()),
+        Exchange::new(&one([4, 4, 4, 4, 2]), 8).map(|_| ()),
+        Exchange::new(&one([4, 2, 2, 2, 2, 2]), 8).map(|_| ()),
+    ];
+    eprintln!("{:?} {results:?}", start.elapsed());
 }
 
 /// Dual numbers differentiate `value`; the derivatives of the kernel are to agree. Returns how many were compared.

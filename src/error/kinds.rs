@@ -81,13 +81,13 @@ kinds! {
             /// The order asked for.
             order: u32,
         } => "full-space kernels exist for orders 2, 4, 6 and 8, not {order}",
-        /// The exact derivation left the range of 128-bit integers.
+        /// The exact derivation left the range of 128-bit integers, or would have too many monomials.
         Overflow {
             /// Degree |beta|.
             degree: u32,
             /// Order r.
             order: u32,
-        } => "the exact kernel of degree {degree} and order {order} does not fit 128-bit rationals",
+        } => "the exact kernel of degree {degree} and order {order} does not fit 128-bit rationals, or has too many monomials",
         /// A derivative of higher degree than the kernel has.
         Regularity {
             /// Degree asked for.
