@@ -149,7 +149,7 @@ kinds! {
             /// Largest legal width.
             high: f64,
         } => "axis {axis}: width {width:e} is outside {low:e} to {high:e}",
-        /// A closed axis narrower than two cutoffs.
+        /// A closed axis narrower than two cutoffs, by more than round-off.
         Narrow {
             /// Axis.
             axis: usize,
