@@ -1,5 +1,7 @@
 //! Kernels: exact derivation, values, derivatives, scalars, limits.
 
+use std::time::{Duration, Instant};
+
 use num_dual::Dual64;
 use parops::{
     Error, ErrorKind, ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, KernelError, MultiIndex,
@@ -253,6 +255,65 @@ fn beyond_the_degree_limit_overflow_is_a_typed_error() {
     }
     assert!(refused > 200, "{refused}");
     assert!(Exchange::new(&one([255, 255, 255]), 2).is_err());
+}
+
+#[test]
+fn derivations_of_too_many_monomials_are_refused_at_once() {
+    fn refused<const D: usize>(exponents: [u8; D]) {
+        let start = Instant::now();
+        let error = Exchange::new(&one(exponents), 8).expect_err("too many");
+        let degree = MultiIndex::new(exponents).degree();
+        assert_eq!(kind(error), ErrorKind::Kernel(KernelError::Overflow { degree, order: 8 }));
+        assert!(start.elapsed() < Duration::from_secs(1), "{exponents:?}: {:?}", start.elapsed());
+    }
+    refused([14; 4]);
+    refused([42; 6]);
+    refused([255; 6]);
+    refused([255; 3]);
+    // Every monomial of the limit at once, in all four parities: C(43, 2) = 903 of them.
+    let limit = Exchange::<3>::DEGREE_LIMIT;
+    let all: Vec<_> = graded::<3>(limit, limit).map(|index| Term { index, factor: 1.0 }).collect();
+    assert_eq!(all.len(), 903);
+    assert!(Exchange::new(&all, 2).is_ok());
+}
+
+#[test]
+fn derivations_near_the_monomial_limit_succeed_in_four_to_six_dimensions() {
+    // The highest degrees within the limit, all of even parity: 969, 715 and 792 monomials.
+    assert!(Exchange::new(&one([8; 4]), 8).is_ok());
+    assert!(Exchange::new(&one([4, 4, 4, 4, 2]), 8).is_ok());
+    assert!(Exchange::new(&one([4, 2, 2, 2, 2, 2]), 8).is_ok());
+}
+
+#[test]
+fn combinations_equal_the_sums_of_their_derivatives() {
+    fn agree<const D: usize>(kernel: &impl SmoothingKernel<f64, D>, terms: &[Term<D>], points: &[[f64; D]]) {
+        let mut combined = vec![f64::NAN; points.len()];
+        kernel.combination(terms, points, &mut combined).expect("smooth");
+        for (z, combined) in points.iter().zip(combined) {
+            let parts = terms.iter().map(|term| term.factor * kernel.derivative(term.index, z).expect("smooth"));
+            let (sum, absolute) = parts.fold((0.0, 0.0), |(sum, size), part| (sum + part, size + part.abs()));
+            // The parts of a derivative cancel by up to the value of the absolute polynomial at |z| <= 5, 5^4 times.
+            let tolerance =
+                64.0 * f64::EPSILON * (absolute + 625.0 * (-0.5 * z.iter().map(|x| x * x).sum::<f64>()).exp());
+            assert!((combined - sum).abs() <= tolerance, "{terms:?} at {z:?}: {combined:e} and {sum:e}");
+        }
+    }
+    // More points than a block holds.
+    let points: Vec<[f64; 2]> = (0..150).map(|i| [0.03 * f64::from(i) - 2.0, 2.5 - 0.04 * f64::from(i)]).collect();
+    for degree in 0..=4 {
+        let terms: Vec<_> = graded::<2>(degree, degree)
+            .zip([1.0, -0.5, 3.0, 0.0, 2.0])
+            .map(|(index, factor)| Term { index, factor })
+            .collect();
+        agree(&Gaussian::<2>::new(), &terms, &points);
+        for order in [2, 4, 6, 8] {
+            agree(&HighOrderGaussian::<2>::new(order).expect("order"), &terms, &points);
+        }
+    }
+    let none = [Term { index: MultiIndex::<2>::ZERO, factor: 0.0 }; 0];
+    agree(&Gaussian::<2>::new(), &none, &points);
+    agree(&HighOrderGaussian::<2>::new(4).expect("order"), &none, &points);
 }
 
 /// Dual numbers differentiate `value`; the derivatives of the kernel are to agree. Returns how many were compared.

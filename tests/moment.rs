@@ -1,9 +1,9 @@
 //! Moments by quadrature, in closed form and over particles.
 
 use parops::{
-    CenterTerm, Error, ErrorKind, Exchange, Gaussian, Kernel, MultiIndex, Neighbor, OperatorError, ParticleError,
-    Stencil, Term, Volumes, continuous_moment, discrete_moment, discrete_moments, graded, moment_conditions,
-    required_moment,
+    CenterTerm, Error, ErrorKind, Exchange, Gaussian, Kernel, KernelError, MultiIndex, Neighbor, OperatorError,
+    ParticleError, Stencil, Term, Volumes, continuous_moment, discrete_moment, discrete_moments, graded,
+    moment_conditions, required_moment,
 };
 use proptest::prelude::*;
 
@@ -152,4 +152,63 @@ fn discrete_moments_refuse_what_is_not_finite_or_missing() {
     // Far away the kernel is zero and z^alpha infinite.
     row.push(Neighbor { q: 1, separation: [1e200], sign: 1 });
     assert!(moment(&volumes, 1.0, &row).expect("finite").is_finite());
+}
+
+/// exp(-|z|^2) with radii of its own.
+struct Radii<const D: usize> {
+    terms: Vec<Term<D>>,
+    support: f64,
+    overlap_limit: f64,
+}
+
+impl<const D: usize> Kernel<f64, D> for Radii<D> {
+    fn value(&self, z: &[f64; D]) -> f64 {
+        (-z.iter().map(|x| x * x).sum::<f64>()).exp()
+    }
+    fn terms(&self) -> &[Term<D>] {
+        &self.terms
+    }
+    fn order(&self) -> u32 {
+        2
+    }
+    fn support(&self) -> f64 {
+        self.support
+    }
+    fn overlap_limit(&self) -> f64 {
+        self.overlap_limit
+    }
+}
+
+fn zeroth<const D: usize>(support: f64, overlap_limit: f64) -> Result<f64, ErrorKind> {
+    let kernel = Radii { terms: one([0; D]), support, overlap_limit };
+    let moment = continuous_moment(&kernel, MultiIndex::ZERO);
+    moment.map(|moment| moment.value).map_err(|error| error.kind().clone())
+}
+
+#[test]
+fn radii_whose_lattices_never_end_are_refused_and_others_are_not() {
+    fn refused<const D: usize>(support: f64, overlap_limit: f64) {
+        let expected = ErrorKind::Kernel(KernelError::Radii { support, overlap_limit });
+        assert_eq!(zeroth::<D>(support, overlap_limit), Err(expected), "D = {D}");
+    }
+    // The radius, the diameter, its square and its cube overflow.
+    for support in [1.5e308, 8e307, 1e154, f64::INFINITY, 0.0, -1.0] {
+        refused::<1>(support, 1.0);
+        refused::<2>(support, 1.0);
+    }
+    refused::<3>(1e110, 1.0);
+    // The spacing underflows.
+    refused::<1>(5e-324, 5e-324);
+    refused::<2>(6.0, f64::INFINITY);
+    // Legal, though far too coarse for this kernel: no lattice can see it.
+    assert!(zeroth::<1>(1e150, 1.0).expect("an end").is_finite());
+    assert!(zeroth::<3>(1e100, 1e-300).expect("an end").is_finite());
+}
+
+#[test]
+fn quadratures_of_too_many_points_are_refused() {
+    // 3^21 points are the fewest that surround a point in 21 dimensions.
+    let expected = KernelError::Points { points: 3_f64.powi(21), limit: 16777216.0 };
+    assert_eq!(zeroth::<21>(6.0, 2.0 / 3.0), Err(ErrorKind::Kernel(expected)));
+    assert!(zeroth::<12>(6.0, 2.0 / 3.0).is_err());
 }

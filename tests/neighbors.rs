@@ -292,6 +292,27 @@ fn neighbors_at_exactly_the_cutoff_are_in_for_every_provider() {
 }
 
 #[test]
+fn cell_list_equals_brute_force_where_two_cutoffs_are_a_box_and_its_round_off() {
+    for factor in [1.0, 1.0 + 2.0 * f64::EPSILON, 1.0 + 4.0 * f64::EPSILON] {
+        for (kinds, lower) in [([0; 2], 0.0), ([0; 2], -0.3), ([6, 0], 0.7), ([8, 7], 0.1)] {
+            let upper = lower + 1.0;
+            let domain = Domain::new([lower; 2], [upper; 2], kinds.map(|kind| AXES[kind])).unwrap();
+            let cutoff = 0.5 * (upper - lower) * factor;
+            // Ties at half the box on the lattice, and particles on the faces and one ulp from them.
+            let mut points = Particles::lattice([lower; 2], [upper; 2], [8; 2]).unwrap().points().to_vec();
+            let edges = [lower, lower.next_up(), lower + 0.5, (lower + 0.5).next_up(), upper.next_down(), upper];
+            points.extend(edges.iter().flat_map(|&x| edges.map(|y| [x, y])));
+            let mut random = Random::new(5);
+            points.extend((0..60).map(|_| std::array::from_fn(|_| (lower + random.uniform()).min(upper))));
+            let particles = Particles::new(points).unwrap();
+            let cells = CellList::build(&particles, &domain, Cutoff(cutoff)).unwrap();
+            let oracle = BruteForce::build(&particles, &domain, Cutoff(cutoff)).unwrap();
+            assert_same_rows(&cells, &oracle, cutoff);
+        }
+    }
+}
+
+#[test]
 fn images_carry_the_sign_and_separation_of_their_mirrors() {
     let faces = [[Face::MirrorOdd, Face::Open], [Face::MirrorEven, Face::Open]];
     let corner = Domain::new([0.0; 2], [f64::INFINITY; 2], faces).unwrap();

@@ -236,6 +236,41 @@ fn spacing_is_exact_for_lattices_lines_and_planes() {
 }
 
 #[test]
+fn spacing_of_equal_volumes_does_not_depend_on_their_number() {
+    // V and the root are rounded once each, and cbrt to an ulp.
+    const TOLERANCE: f64 = 2.0 * f64::EPSILON;
+    for n in [3, 7, 24, 49, 60] {
+        let line = Particles::lattice([0.0], [1.0], [n]).unwrap();
+        let square = Particles::lattice([0.0; 2], [1.0; 2], [n; 2]).unwrap();
+        let cube = Particles::lattice([0.0; 3], [1.0; 3], [n; 3]).unwrap();
+        let spacings = [line.spacing(), square.spacing(), cube.spacing()].map(|h| h.unwrap().0);
+        for h in spacings {
+            assert!((h * n as f64 - 1.0).abs() <= TOLERANCE, "{n}: {h:e}");
+        }
+    }
+}
+
+#[test]
+fn box_that_fits_two_cutoffs_of_its_own_spacing_is_wide_enough() {
+    fn fits<const D: usize>(n: usize) {
+        let width = 0.1 * n as f64;
+        let set = Particles::lattice([0.0; D], [width; D], [n; D]).unwrap();
+        let torus = Domain::periodic([0.0; D], [width; D]).unwrap();
+        let epsilon = set.spacing().unwrap().epsilon(n as f64 / 12.0).unwrap();
+        assert_eq!(torus.admits(epsilon.cutoff(6.0)), Ok(()), "D = {D}, n = {n}");
+        let wider = set.spacing().unwrap().epsilon(n as f64 / 12.0 * (1.0 + 1e-14)).unwrap();
+        assert!(torus.admits(wider.cutoff(6.0)).is_err());
+    }
+    for n in (12..=96).chain([200]) {
+        fits::<1>(n);
+        fits::<2>(n);
+    }
+    for n in 12..=48 {
+        fits::<3>(n);
+    }
+}
+
+#[test]
 fn epsilon_follows_the_local_spacing_and_names_lonely_particles() {
     // Rings of spacing 1 and 2, with cutoffs that hold two neighbors on either side.
     let ring_of = |h: f64| Particles::new((0..16).map(|i| [h * f64::from(i)]).collect()).unwrap();

@@ -585,3 +585,15 @@ fn matrix_free_gradient_divergence_and_velocity_have_the_bits_of_stored_rows() -
     assert_eq!(a, b);
     Ok(())
 }
+
+#[test]
+fn allowance_covers_its_targets_in_any_order() {
+    for targets in [vec![9, 5, 1], vec![1, 5, 9], vec![5, 9, 5, 1, 9]] {
+        let allowance = Allowance::at(targets);
+        let covered: Vec<_> = (0..12).filter(|&p| allowance.covers(p)).collect();
+        assert_eq!(covered, [1, 5, 9]);
+        assert_eq!(allowance, Allowance::at([1, 5, 9]));
+    }
+    assert!((0..12).all(|p| Allowance::Everywhere.covers(p) && !Allowance::Nowhere.covers(p)));
+    assert!(!Allowance::at([]).covers(0));
+}

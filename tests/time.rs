@@ -5,8 +5,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use nalgebra::{Complex, DVector, SVector, Vector3};
 use parops::{
-    Error, ErrorKind, Euler, Exponential, Leapfrog, Plan, Policy, Result, Rk4, State, StepLimit, Stepper, TimeError,
-    integrate,
+    Error, ErrorKind, Euler, Exponential, Leapfrog, ParticleError, Plan, Policy, Result, Rk4, State, StepLimit,
+    Stepper, TimeError, integrate,
 };
 use proptest::prelude::*;
 
@@ -557,6 +557,13 @@ fn exponential_refuses_illegal_matrices_states_and_times() {
     });
     assert_eq!(error.unwrap_err(), Error::from(TimeError::NotFinite { stage: 1, t: 0.0 }).at(2));
     assert_eq!(kind(Exponential::new(1, |_, _| Err(Error::user(3))).unwrap_err()), ErrorKind::User { code: 3 });
+
+    // The square of the first wraps to zero; that of the last does not, but its bytes do.
+    for size in [1 << 32, usize::MAX, 1 << 31] {
+        let refused = Exponential::new(size, |_, _| panic!("memory comes first"));
+        let count = size.saturating_mul(size);
+        assert_eq!(kind(refused.unwrap_err()), ErrorKind::Particle(ParticleError::Memory { count }));
+    }
 
     let ring = Exponential::new(4, ring).unwrap();
     let refuse = |t, u: &mut [f64]| ring.propagate(t, u).unwrap_err();

@@ -13,6 +13,10 @@ pub const LENGTH_LOW: f64 = f64::from_bits((1023 - 200) << 52);
 /// Largest legal width of a box and largest legal cutoff, 2^200: squares stay far from overflow.
 pub const LENGTH_HIGH: f64 = f64::from_bits((1023 + 200) << 52);
 
+/// By how much a cutoff that is half a width by design may exceed it: h is rounded by 2 eps at most, and multiplied
+/// twice, by epsilon/h and by the support.
+const ROUND_OFF: f64 = 4.0 * f64::EPSILON;
+
 /// What lies behind a face of the box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Face {
@@ -161,7 +165,11 @@ impl<const D: usize> Domain<D> {
         Ok(wrapped)
     }
 
-    /// Whether images are counted rightly up to this cutoff: an axis closed on both sides must be two cutoffs wide.
+    /// Whether images are counted rightly up to this cutoff: an axis closed on both sides must be two cutoffs wide, to
+    /// the 4 eps that a cutoff of so many spacings may be rounded by.
+    ///
+    /// That much less is safe: only below one cutoff would an image be missed, and the two images of one source that
+    /// come within the cutoff are those that a width of exactly two cutoffs has at a tie, where both are in.
     ///
     /// # Errors
     /// [`DomainError::Narrow`] where it is not.
@@ -169,7 +177,7 @@ impl<const D: usize> Domain<D> {
         for (axis, faces) in self.faces.iter().enumerate() {
             let width = self.upper[axis] - self.lower[axis];
             let closed = faces[0] == Face::Periodic || faces.iter().all(|face| face.is_mirror());
-            if closed && !(width >= 2.0 * cutoff.0) {
+            if closed && !(width >= 2.0 * cutoff.0 * (1.0 - ROUND_OFF)) {
                 return Err(DomainError::Narrow { axis, width, cutoff: cutoff.0 }.into());
             }
         }

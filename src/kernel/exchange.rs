@@ -1,5 +1,7 @@
 //! Exchange kernels eta^beta of any multi-index, and of sums of one degree, derived exactly.
 
+use std::collections::BTreeSet;
+
 use super::derivation::{harmonics, radial};
 use super::harmonic::Harmonic;
 use super::polynomial::ExactPolynomial;
@@ -59,6 +61,13 @@ impl<const D: usize> Exchange<D> {
     /// absolute terms of P, which cancel ever more with growing m.
     pub const DEGREE_LIMIT: u32 = 41;
 
+    /// The largest number of monomials of degree m that the derivation can meet.
+    ///
+    /// It meets those that differ from some beta_i by even numbers: for each parity that occurs among the beta_i, with
+    /// n odd exponents, C((m - n)/2 + D - 1, D - 1). Enough for any sum up to [`DEGREE_LIMIT`](Self::DEGREE_LIMIT) for
+    /// D <= 3, and for single multi-indices up to degree 32 for D = 4, 18 for D = 5 and 14 for D = 6.
+    pub const MONOMIAL_LIMIT: usize = 1024;
+
     /// The kernel of sum_i c_i D^beta_i to order r = `order`.
     ///
     /// The factors c_i are taken as the binary fractions they are, so that a sum of harmonics that cancels is
@@ -67,14 +76,18 @@ impl<const D: usize> Exchange<D> {
     ///
     /// # Errors
     /// [`KernelError::Order`] where r is not 2, 4, 6 or 8, [`KernelError::Overflow`] where the exact derivation
-    /// of a term does not fit 128 bits (never up to [`DEGREE_LIMIT`](Self::DEGREE_LIMIT) for D <= 3), and the
-    /// refusals of [`common_degree`].
+    /// of a term does not fit 128 bits or that of the sum [`MONOMIAL_LIMIT`](Self::MONOMIAL_LIMIT) monomials (neither
+    /// up to [`DEGREE_LIMIT`](Self::DEGREE_LIMIT) for D <= 3), and the refusals of [`common_degree`].
     pub fn new(terms: &[Term<D>], order: u32) -> Result<Self> {
         let degree = common_degree(terms)?;
         if !matches!(order, 2 | 4 | 6 | 8) {
             return Err(KernelError::Order { order }.into());
         }
         let overflow = || Error::from(KernelError::Overflow { degree, order });
+        // Before the first expansion, which alone may take hours.
+        if monomials(terms, degree) > Self::MONOMIAL_LIMIT as f64 {
+            return Err(overflow());
+        }
         // A power of two of the size of the largest factor is taken out and put back at the end.
         let largest = terms.iter().fold(0.0, |largest: f64, term| largest.max(term.factor.abs()));
         let scale = f64::from_bits(largest.to_bits() & (0x7ff << 52));
@@ -140,6 +153,18 @@ impl<const D: usize> Exchange<D> {
             _ => None,
         }
     }
+}
+
+/// How many monomials of this degree the Laplacian and |z|^2 can make of those of the terms; see
+/// [`Exchange::MONOMIAL_LIMIT`].
+fn monomials<const D: usize>(terms: &[Term<D>], degree: u32) -> f64 {
+    let parities: BTreeSet<_> = terms.iter().map(|term| term.index.exponents().map(|n| n % 2)).collect();
+    let counts = parities.iter().map(|parity| {
+        let pairs = (degree - parity.iter().map(|&odd| u32::from(odd)).sum::<u32>()) / 2;
+        // C(pairs + D - 1, D - 1), one dimension after another.
+        (1..D).fold(1.0, |count, axis| count * f64::from(pairs) / axis as f64 + count)
+    });
+    counts.sum()
 }
 
 /// sum_i (c_i / scale) z^beta_i.

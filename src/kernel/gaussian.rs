@@ -83,6 +83,23 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for Gaussian<D> {
         Ok(product)
     }
 
+    fn combination(&self, terms: &[Term<D>], z: &[[T; D]], out: &mut [T]) -> Result<()> {
+        for (z, out) in z.iter().zip(out) {
+            let value = self.value(z);
+            *out = T::zero();
+            for term in terms {
+                let mut product = value;
+                for (&x, n) in z.iter().zip(term.index.exponents()) {
+                    if n > 0 {
+                        product *= signed_hermite(n, x);
+                    }
+                }
+                *out += T::lift(term.factor) * product;
+            }
+        }
+        Ok(())
+    }
+
     fn gradient(&self, z: &[T; D]) -> Result<[T; D]> {
         let value = self.value(z);
         Ok(z.map(|x| -x * value))

@@ -28,6 +28,8 @@ use crate::scalar::{Scalar, square};
 #[derive(Clone, Debug)]
 pub struct HighOrderGaussian<const D: usize> {
     identity: Exchange<D>,
+    /// How many coefficients P has, r/2.
+    coefficients: usize,
     /// g(s) exp(s) = sum_k profile_k s^k and its first three derivatives; P has at most four coefficients.
     profiles: [[f64; 4]; 4],
 }
@@ -49,7 +51,7 @@ impl<const D: usize> HighOrderGaussian<D> {
         for j in 1..4 {
             profiles[j] = std::array::from_fn(|k| if k < 3 { profiles[j - 1][k + 1] * (k + 1) as f64 } else { 0.0 });
         }
-        Ok(Self { identity, profiles })
+        Ok(Self { identity, coefficients: order as usize / 2, profiles })
     }
 
     /// The same kernel among the exchange kernels, with its exact polynomial and moments.
@@ -57,14 +59,16 @@ impl<const D: usize> HighOrderGaussian<D> {
         &self.identity
     }
 
-    /// exp(s) g^(m)(s) = (d/ds - 1)^m P = sum_j C(m,j) (-1)^(m-j) P^(j), from the values P^(j)(s).
+    /// The coefficients of exp(s) g^(m)(s) = (d/ds - 1)^m P = sum_j C(m,j) (-1)^(m-j) P^(j).
     #[inline]
-    fn differentiated<T: Scalar>(m: u32, jet: &[T; 4]) -> T {
+    fn differentiated(&self, m: u32) -> [f64; 4] {
         let m = f64::from(m);
-        let binomials = [1.0, m, m * (m - 1.0) / 2.0, m * (m - 1.0) * (m - 2.0) / 6.0];
-        let sum =
-            jet[0] - jet[1] * T::lift(binomials[1]) + jet[2] * T::lift(binomials[2]) - jet[3] * T::lift(binomials[3]);
-        if m % 2.0 == 0.0 { sum } else { -sum }
+        let binomials = [1.0, -m, m * (m - 1.0) / 2.0, -m * (m - 1.0) * (m - 2.0) / 6.0];
+        let sign = if m % 2.0 == 0.0 { 1.0 } else { -1.0 };
+        std::array::from_fn(|k| {
+            let sum: f64 = self.profiles.iter().zip(binomials).map(|(profile, binomial)| profile[k] * binomial).sum();
+            sign * sum
+        })
     }
 }
 
@@ -98,30 +102,41 @@ impl<T: Scalar, const D: usize> Kernel<T, D> for HighOrderGaussian<D> {
 
 impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for HighOrderGaussian<D> {
     fn derivative(&self, beta: MultiIndex<D>, z: &[T; D]) -> Result<T> {
-        let degree = beta.degree();
-        if degree > Self::DERIVATIVE_LIMIT {
-            return Err(KernelError::Regularity { degree, limit: Self::DERIVATIVE_LIMIT }.into());
-        }
-        let s = square(z);
-        let jet = self.profiles.each_ref().map(|profile| horner(profile, s));
-        let exponents = beta.exponents();
-        let mut halves = [0_u8; D];
-        let mut sum = T::zero();
-        // Counts through all k with 2k <= beta.
-        loop {
-            let mut product = T::one();
-            for axis in 0..D {
-                product *= monomial(exponents[axis], halves[axis], z[axis]);
+        let mut out = [T::zero()];
+        self.combination(&[Term { index: beta, factor: 1.0 }], std::slice::from_ref(z), &mut out)?;
+        Ok(out[0])
+    }
+
+    fn derivatives(&self, beta: MultiIndex<D>, z: &[[T; D]], out: &mut [T]) -> Result<()> {
+        self.combination(&[Term { index: beta, factor: 1.0 }], z, out)
+    }
+
+    fn combination(&self, terms: &[Term<D>], z: &[[T; D]], out: &mut [T]) -> Result<()> {
+        out.fill(T::zero());
+        for &Term { index, factor } in terms {
+            let degree = index.degree();
+            if degree > Self::DERIVATIVE_LIMIT {
+                return Err(KernelError::Regularity { degree, limit: Self::DERIVATIVE_LIMIT }.into());
             }
-            let taken: u32 = halves.iter().map(|&k| u32::from(k)).sum();
-            sum += product * Self::differentiated(degree - taken, &jet);
-            let Some(axis) = (0..D).find(|&axis| 2 * u32::from(halves[axis]) + 2 <= u32::from(exponents[axis])) else {
-                break;
-            };
-            halves[axis] += 1;
-            halves[..axis].fill(0);
+            for_each_half(index, |halves, taken| {
+                let radial = self.differentiated(degree - taken);
+                let radial = &radial[..self.coefficients];
+                let mut front = T::lift(factor);
+                let mut exponents = index.exponents();
+                for (n, &k) in exponents.iter_mut().zip(halves) {
+                    front *= T::lift(constant(*n, k));
+                    *n -= 2 * k;
+                }
+                let monomial = MultiIndex::new(exponents);
+                for (z, out) in z.iter().zip(&mut *out) {
+                    *out += front * monomial.power(z) * horner(radial, square(z));
+                }
+            });
         }
-        Ok(sum * (-s).exp())
+        for (z, out) in z.iter().zip(out) {
+            *out *= (-square(z)).exp();
+        }
+        Ok(())
     }
 
     fn gradient(&self, z: &[T; D]) -> Result<[T; D]> {
@@ -135,18 +150,29 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for HighOrderGaussian<D> {
     }
 }
 
-/// n! / (k! (n - 2k)!) (2x)^(n - 2k).
+/// Calls `visit(k, |k|)` for all k with 2k <= beta.
 #[inline]
-fn monomial<T: Scalar>(n: u8, k: u8, x: T) -> T {
+fn for_each_half<const D: usize>(beta: MultiIndex<D>, mut visit: impl FnMut(&[u8; D], u32)) {
+    let exponents = beta.exponents();
+    let mut halves = [0_u8; D];
+    loop {
+        visit(&halves, halves.iter().map(|&k| u32::from(k)).sum());
+        let Some(axis) = (0..D).find(|&axis| 2 * u32::from(halves[axis]) + 2 <= u32::from(exponents[axis])) else {
+            return;
+        };
+        halves[axis] += 1;
+        halves[..axis].fill(0);
+    }
+}
+
+/// 2^(n - 2k) n! / (k! (n - 2k)!).
+#[inline]
+fn constant(n: u8, k: u8) -> f64 {
     let (n, k) = (u32::from(n), u32::from(k));
     let mut factor = 1.0;
     for i in 0..k {
         // n! / (n - 2k)! has two factors for each one of k!.
         factor *= f64::from((n - 2 * i) * (n - 2 * i - 1)) / f64::from(i + 1);
     }
-    let mut product = T::lift(factor);
-    for _ in 0..n - 2 * k {
-        product *= x + x;
-    }
-    product
+    (0..n - 2 * k).fold(factor, |product, _| product + product)
 }

@@ -18,6 +18,9 @@ use crate::error::Result;
 use crate::multi_index::{MultiIndex, Term};
 use crate::scalar::Scalar;
 
+/// Points per block of a combination; small enough for the stack.
+const BLOCK: usize = 64;
+
 /// A kernel eta(z), z = (x_p - x_q)/epsilon, that approximates a differential operator of one degree.
 ///
 /// With eta_epsilon(x) = epsilon^-D eta(x/epsilon), the integral
@@ -87,6 +90,25 @@ pub trait SmoothingKernel<T: Scalar, const D: usize>: Kernel<T, D> {
     fn derivatives(&self, beta: MultiIndex<D>, z: &[[T; D]], out: &mut [T]) -> Result<()> {
         for (z, out) in z.iter().zip(out) {
             *out = self.derivative(beta, z)?;
+        }
+        Ok(())
+    }
+
+    /// sum_i c_i D^beta_i W at many points; `out` is as long as `z`. Override it where the terms share their profile.
+    ///
+    /// # Errors
+    /// As [`derivative`](Self::derivative).
+    fn combination(&self, terms: &[Term<D>], z: &[[T; D]], out: &mut [T]) -> Result<()> {
+        let mut derivative = [T::zero(); BLOCK];
+        for (z, out) in z.chunks(BLOCK).zip(out.chunks_mut(BLOCK)) {
+            out.fill(T::zero());
+            for term in terms {
+                let derivative = &mut derivative[..z.len()];
+                self.derivatives(term.index, z, derivative)?;
+                for (out, &derivative) in out.iter_mut().zip(&*derivative) {
+                    *out += T::lift(term.factor) * derivative;
+                }
+            }
         }
         Ok(())
     }

@@ -87,17 +87,27 @@ pub fn continuous_moment<const D: usize>(
 /// stated error tells. Exact moments: [`Exchange::moment`](crate::Exchange::moment).
 ///
 /// # Errors
-/// [`KernelError::Radii`] where the support or the overlap limit is not positive and finite.
+/// [`KernelError::Radii`] where the support R or the overlap limit is not positive and finite, or (3.5 R)^max(D, 2) is
+/// not, or the finest spacing underflows; [`KernelError::Points`] where the finest lattice has more than 2^24 points,
+/// which takes at least 11 dimensions.
 pub fn continuous_moments<const D: usize>(
     kernel: &(impl Kernel<f64, D> + ?Sized),
     alphas: &[MultiIndex<D>],
 ) -> Result<Vec<Quadrature>> {
     let (support, overlap_limit) = (kernel.support(), kernel.overlap_limit());
-    if !(support > 0.0 && support.is_finite() && overlap_limit > 0.0 && overlap_limit.is_finite()) {
-        return Err(KernelError::Radii { support, overlap_limit }.into());
-    }
     let radius = BALL * support;
     let finest = 2.0 * radius / (POINTS.powf(1.0 / D.max(1) as f64) - 1.0);
+    // Squares of distances and volumes of cells must not overflow, spacings not vanish: such a lattice has no end.
+    let largest = (0..D.max(2)).fold(1.0, |product, _| product * 2.0 * radius);
+    let spaced = finest.is_normal() && largest.is_finite();
+    if !(support > 0.0 && overlap_limit > 0.0 && overlap_limit.is_finite() && spaced) {
+        return Err(KernelError::Radii { support, overlap_limit }.into());
+    }
+    // In many dimensions even the fewest coordinates an axis may have make too many points.
+    let points = (0..D).fold(1.0, |product, _| product * (2.0 * (radius / finest).floor() + 3.0));
+    if points > MOST_POINTS {
+        return Err(KernelError::Points { points, limit: MOST_POINTS }.into());
+    }
     let mut h = (0.5 * overlap_limit).max(finest);
     loop {
         let [(at_nodes, absolute), (between, _)] =
@@ -118,8 +128,10 @@ pub fn continuous_moments<const D: usize>(
 
 /// Radius of the ball of integration over the support. exp(-|z|^2/4), the slowest to fall, is 5e-22 at 1.75 * 8.
 const BALL: f64 = 1.75;
-/// The largest number of points of one lattice.
+/// The number of points of the finest lattice, up to its edges.
 const POINTS: f64 = 1048576.0;
+/// The largest number of points of one lattice, edges included.
+const MOST_POINTS: f64 = 16777216.0;
 /// Two sums agree to this fraction of the absolute moment: 450 eps, which rounding in 2^20 terms stays below.
 const AGREEMENT: f64 = 1e-13;
 

@@ -12,7 +12,7 @@ mod typed;
 
 pub use dcpse::{CUTOFF_OVER_EPSILON, DcPse, DcPseScratch};
 pub use expression::{Expression, Operator, Outputs, ShowSum, Value};
-pub use method::{Allowance, Breach, Method, RowReport, spread};
+pub use method::{Allowance, Breach, Method, RowReport, Targets, spread};
 pub use named::{Along, Divergence, Gradient, Laplacian};
 pub use pairwise::{MOMENT_TOLERANCE, PairScratch};
 pub use pse::{Form, Pse, Sign};

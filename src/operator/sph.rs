@@ -9,9 +9,6 @@ use crate::multi_index::Term;
 use crate::scale::{Cutoff, Epsilon, Volumes};
 use crate::stencil::Stencil;
 
-/// Points per block of a sum of derivatives; small enough for the stack.
-const BLOCK: usize = 64;
-
 /// sum_i c_i D^beta_i W of a smoothing kernel W, as a kernel of its own.
 ///
 /// Integration by parts gives it the moments (-1)^m c_i beta_i! of an exchange kernel for the same operator, so SPH
@@ -43,19 +40,9 @@ impl<W: SmoothingKernel<f64, D>, const D: usize> Kernel<f64, D> for Differentiat
     }
 
     fn values(&self, z: &[[f64; D]], out: &mut [f64]) {
-        let mut derivative = [0.0; BLOCK];
-        for (z, out) in z.chunks(BLOCK).zip(out.chunks_mut(BLOCK)) {
-            out.fill(0.0);
-            for &Term { index, factor } in &self.terms {
-                let derivative = &mut derivative[..z.len()];
-                // `new` has seen every term differentiated; a kernel that fails here after all gives no number.
-                if self.kernel.derivatives(index, z, derivative).is_err() {
-                    derivative.fill(f64::NAN);
-                }
-                for (out, derivative) in out.iter_mut().zip(derivative) {
-                    *out += factor * *derivative;
-                }
-            }
+        // `new` has seen every term differentiated; a kernel that fails here after all gives no number.
+        if self.kernel.combination(&self.terms, z, out).is_err() {
+            out.fill(f64::NAN);
         }
     }
 

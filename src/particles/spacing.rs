@@ -7,7 +7,7 @@ use crate::scale::Spacing;
 impl<const D: usize> Particles<D> {
     /// An estimate of the spacing h.
     ///
-    /// With volumes: h = (1/N) sum_p V_p^(1/D). Without: the solution of prod_i (L_i / h + 1) = N, where L_i are the
+    /// With volumes: h = (1/N) sum_p V_p^(1/D), which is V^(1/D) to two roundings where they are equal. Without: the solution of prod_i (L_i / h + 1) = N, where L_i are the
     /// extents of the bounding box. That is exact for full lattices, and on lines and planes in higher dimensions
     /// it is the spacing along them.
     ///
@@ -27,13 +27,16 @@ impl<const D: usize> Particles<D> {
             return Err(ParticleError::TooFew { count: self.len(), needed }.into());
         }
         let spacing = match &self.volumes {
-            Some(volumes) => {
-                let mut sum = 0.0;
-                for p in 0..self.len() {
-                    sum += volumes.get(p)?.powf(1.0 / D as f64);
+            Some(volumes) => match volumes.common() {
+                Some(volume) => edge::<D>(volume),
+                None => {
+                    let mut sum = 0.0;
+                    for p in 0..self.len() {
+                        sum += edge::<D>(volumes.get(p)?);
+                    }
+                    sum / self.len() as f64
                 }
-                sum / self.len() as f64
-            }
+            },
             None => spacing_in(self.extents(), self.len() as f64),
         };
         if !(spacing > 0.0 && spacing.is_finite()) {
@@ -49,6 +52,16 @@ impl<const D: usize> Particles<D> {
                 along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (x.min(low), x.max(high)));
             high - low
         })
+    }
+}
+
+/// V^(1/D), by the roots that are rounded once where there are such.
+fn edge<const D: usize>(volume: f64) -> f64 {
+    match D {
+        1 => volume,
+        2 => volume.sqrt(),
+        3 => volume.cbrt(),
+        _ => volume.powf(1.0 / D as f64),
     }
 }
 

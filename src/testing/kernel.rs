@@ -125,7 +125,7 @@ pub enum KernelFault<const D: usize> {
         /// The constant.
         found: f64,
     },
-    /// A derivative that differs from difference quotients, from the gradient, or from the batched derivatives.
+    /// A derivative that differs from difference quotients, from the gradient, the batched derivatives or a combination.
     Derivative {
         /// Which.
         beta: MultiIndex<D>,

@@ -4,10 +4,10 @@ use super::kernel::{KernelFault, KernelLimits, check_kernel};
 use super::sample::spread;
 use crate::error::{ErrorKind, KernelError};
 use crate::kernel::SmoothingKernel;
-use crate::multi_index::MultiIndex;
+use crate::multi_index::{MultiIndex, Term};
 
 /// Checks a smoothing kernel: all of [`check_kernel`] for f itself (so Int W = 1), evenness, and first and second
-/// derivatives against difference quotients, the gradient and the batched derivatives.
+/// derivatives against difference quotients, the gradient, the batched derivatives and the combinations.
 ///
 /// A kernel may refuse second derivatives, with [`KernelError::Regularity`], but not first ones.
 ///
@@ -84,6 +84,10 @@ fn check_derivative<const D: usize>(
             return Err(KernelFault::NotFinite { z, value: found });
         }
         same(beta, z, many, found, 64.0 * f64::EPSILON * largest)?;
+        let mut combined = [0.0];
+        let terms = [3.0, -2.0].map(|factor| Term { index: beta, factor });
+        kernel.combination(&terms, &[z], &mut combined)?;
+        same(beta, z, combined[0], found, 64.0 * f64::EPSILON * largest)?;
         let [ahead, behind] = [STEP, -STEP].map(|step| {
             let mut moved = z;
             moved[axis] += step;

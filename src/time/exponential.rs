@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::stepper::check_finite;
 use crate::error::{Error, Result, TimeError};
+use crate::particles::reserved;
 
 /// The exact propagator u(t) = exp(t A) u(0) of u' = A u, A a small dense matrix.
 ///
@@ -43,10 +44,14 @@ impl Exponential {
     /// `size`; `du` is zero before.
     ///
     /// # Errors
-    /// [`TimeError::NotFinite`] (stage 1, t = 0) naming the row of the first entry that is not finite; and those of
+    /// [`ParticleError::Memory`](crate::ParticleError::Memory) where there is no memory for N^2 entries, before `apply`
+    /// is called; [`TimeError::NotFinite`] (stage 1, t = 0) naming the row of the first entry that is not finite; and those of
     /// `apply`.
     pub fn new(size: usize, mut apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<Self> {
-        let mut a = DMatrix::zeros(size, size);
+        let count = size.saturating_mul(size);
+        let mut entries = reserved(count)?;
+        entries.resize(count, 0.0);
+        let mut a = DMatrix::from_vec(size, size, entries);
         let mut unit = vec![0.0; size];
         for (q, mut column) in a.column_iter_mut().enumerate() {
             unit[q] = 1.0;

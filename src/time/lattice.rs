@@ -23,27 +23,8 @@ const SHELL: f64 = 1e-12;
 /// of the overlap), over all lattice points j != 0 with |z_j| <= radius.
 ///
 /// ```
-/// use parops::{Euler, Kernel, LatticeSpectrum, MultiIndex, Term};
-/// /// eta(z) = 4 pi^-1/2 exp(-z^2).
-/// struct Narrow([Term<1>; 1]);
-/// impl Kernel<f64, 1> for Narrow {
-///     fn value(&self, z: &[f64; 1]) -> f64 {
-///         4.0 / std::f64::consts::PI.sqrt() * (-z[0] * z[0]).exp()
-///     }
-///     fn terms(&self) -> &[Term<1>] {
-///         &self.0
-///     }
-///     fn order(&self) -> u32 {
-///         2
-///     }
-///     fn support(&self) -> f64 {
-///         7.0
-///     }
-///     fn overlap_limit(&self) -> f64 {
-///         1.0
-///     }
-/// }
-/// let narrow = Narrow([Term { index: MultiIndex::new([2]), factor: 1.0 }]);
+/// use parops::{Euler, Exchange, LatticeSpectrum, MultiIndex, Term};
+/// let narrow = Exchange::new(&[Term { index: MultiIndex::new([2]), factor: 1.0 }], 2)?;
 /// let spectrum = LatticeSpectrum::scan(&narrow, 1.0, 7.0)?;
 /// assert!((spectrum.lambda_max - 3.321974003905699).abs() < 1e-12);
 /// let (diffusion, epsilon) = (0.5, 0.1);
