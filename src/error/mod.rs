@@ -1,12 +1,42 @@
 //! One error type: a kind, the particle it concerns, and the numbers that broke the rule.
 
-mod kinds;
+mod apply;
+mod domain;
+mod kernel;
+mod multi_index;
+mod neighbor;
+mod operator;
+mod particle;
+mod time;
 
-pub use kinds::{
-    ApplyError, DomainError, KernelError, MultiIndexError, NeighborError, OperatorError, ParticleError, TimeError,
-};
+pub use apply::ApplyError;
+pub use domain::DomainError;
+pub use kernel::KernelError;
+pub use multi_index::MultiIndexError;
+pub use neighbor::NeighborError;
+pub use operator::OperatorError;
+pub use particle::ParticleError;
+pub use time::TimeError;
 
 use std::fmt;
+
+/// Declares an enum of error kinds together with the sentence each variant is shown as.
+macro_rules! kinds {
+    ($(#[$doc:meta])* $name:ident { $( $(#[$vdoc:meta])* $variant:ident { $( $(#[$fdoc:meta])* $field:ident : $ty:ty ),* $(,)? } => $text:literal, )* }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[non_exhaustive]
+        pub enum $name { $( $(#[$vdoc])* $variant { $( $(#[$fdoc])* $field: $ty ),* }, )* }
+
+        impl std::fmt::Display for $name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                match self { $( $name::$variant { $( $field ),* } => write!(f, $text), )* }
+            }
+        }
+    };
+}
+
+use kinds;
 
 /// What every fallible function of the crate returns.
 pub type Result<T> = std::result::Result<T, Error>;

@@ -1,0 +1,42 @@
+//! Why kernels are refused.
+
+use super::kinds;
+
+kinds! {
+    /// Refusals of the kernel layer.
+    KernelError {
+        /// An order for which no such kernel exists.
+        Order {
+            /// The order asked for.
+            order: u32,
+        } => "full-space kernels exist for orders 2, 4, 6 and 8, not {order}",
+        /// The exact derivation left the range of 128-bit integers, or would have too many monomials.
+        Overflow {
+            /// Degree |beta|.
+            degree: u32,
+            /// Order r.
+            order: u32,
+        } => "the exact kernel of degree {degree} and order {order} does not fit 128-bit rationals, or has too many monomials",
+        /// A derivative of higher degree than the kernel has.
+        Regularity {
+            /// Degree asked for.
+            degree: u32,
+            /// Highest degree the kernel is differentiable to.
+            limit: u32,
+        } => "the kernel has derivatives to degree {limit}, not {degree}",
+        /// A support radius or overlap limit that is not positive and finite, or whose square or volume is not.
+        Radii {
+            /// Support, in units of epsilon.
+            support: f64,
+            /// Largest h / epsilon.
+            overlap_limit: f64,
+        } => "support {support} and overlap limit {overlap_limit} must be positive and finite, the volume within too",
+        /// A quadrature of too many points.
+        Points {
+            /// Number of points.
+            points: f64,
+            /// Largest legal number.
+            limit: f64,
+        } => "a quadrature of {points:e} points is beyond the {limit:e} allowed",
+    }
+}

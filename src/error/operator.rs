@@ -1,0 +1,108 @@
+//! Why methods are refused.
+
+use super::kinds;
+
+kinds! {
+    /// Refusals of the methods that turn a stencil into weights.
+    OperatorError {
+        /// Particles too far apart for the kernel.
+        Overlap {
+            /// h / epsilon at the worst particle.
+            h_over_epsilon: f64,
+            /// The largest legal value.
+            limit: f64,
+        } => "h/epsilon = {h_over_epsilon} is above {limit}, the kernels do not overlap enough",
+        /// Discrete moments too far from their conditions.
+        Moment {
+            /// The relative defect at the worst particle.
+            defect: f64,
+            /// The largest legal value.
+            limit: f64,
+        } => "the discrete moments miss their conditions by {defect}, more than {limit}",
+        /// A target that is no particle, for an operator that needs f_p.
+        NoCenter {
+            /// Number of neighbors of the target.
+            neighbors: usize,
+        } => "the target is no particle (it has {neighbors} neighbors), so the difference f_q - f_p does not exist",
+        /// Per-particle data for another number of particles.
+        Length {
+            /// Entries held.
+            found: usize,
+            /// Index that was needed.
+            index: usize,
+        } => "index {index} is beyond the {found} entries held",
+        /// The strength form asked with an epsilon that varies.
+        VariableEpsilon {
+            /// Smallest epsilon.
+            low: f64,
+            /// Largest epsilon.
+            high: f64,
+        } => "the strength form conserves only with one epsilon, not {low} to {high}",
+        /// A weight that is not finite.
+        Weight {
+            /// The neighbor.
+            q: usize,
+            /// The weight.
+            weight: f64,
+        } => "the weight of neighbor {q} is {weight}",
+        /// A moment system without a solution.
+        Singular {
+            /// Number of neighbors n.
+            neighbors: usize,
+            /// Number of conditions l.
+            conditions: usize,
+            /// Rank of the conditions on this stencil.
+            rank: usize,
+        } => "the {neighbors} neighbors give the {conditions} moment conditions rank {rank} only",
+        /// Fewer neighbors than the moment conditions need.
+        TooFew {
+            /// Number of neighbors n.
+            neighbors: usize,
+            /// Number of conditions l.
+            conditions: usize,
+            /// The fewest legal neighbors.
+            needed: usize,
+        } => "{neighbors} neighbors are fewer than the {needed} needed for {conditions} moment conditions",
+        /// A row whose moments miss their conditions by more than rounding.
+        Uncertified {
+            /// Number of neighbors n.
+            neighbors: usize,
+            /// Number of conditions l.
+            conditions: usize,
+            /// Rank of the conditions on this stencil.
+            rank: usize,
+            /// Estimated condition number.
+            condition: f64,
+            /// The largest miss, in scaled units.
+            residual: f64,
+            /// cutoff / epsilon.
+            ratio: f64,
+        } => "the {neighbors} neighbors miss the {conditions} moment conditions by {residual:e} (rank {rank}, condition {condition:e}, cutoff/epsilon {ratio})",
+        /// A window that is flat or has vanished inside the cutoff.
+        Window {
+            /// cutoff / epsilon.
+            ratio: f64,
+            /// Smallest legal value.
+            low: f64,
+            /// Largest legal value.
+            high: f64,
+        } => "cutoff/epsilon = {ratio} is outside {low} to {high}",
+        /// The '+' sign asked for an even degree.
+        PlusEven {
+            /// The degree.
+            degree: u32,
+        } => "the sign '+' belongs to odd degrees, not to {degree}",
+        /// A degree the method does not serve.
+        Degree {
+            /// The degree.
+            degree: u32,
+            /// The smallest legal degree.
+            low: u32,
+        } => "degree {degree} is below {low}",
+        /// A tolerance, limit or radius that is not positive.
+        Setting {
+            /// The value.
+            value: f64,
+        } => "setting {value} is not a positive number",
+    }
+}
