@@ -26,11 +26,6 @@ kinds! {
             /// The volume.
             volume: f64,
         } => "volume {volume} is not positive and finite",
-        /// A strength or field value that is not finite.
-        Strength {
-            /// The value.
-            value: f64,
-        } => "value {value} is not finite",
         /// An epsilon that is not positive and finite.
         Epsilon {
             /// The epsilon.
