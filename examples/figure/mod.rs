@@ -172,7 +172,7 @@ fn bounds(curves: &[Curve], logarithmic: bool, coordinate: impl Fn(&(f64, f64)) 
 }
 
 fn power_of_ten(value: &f64) -> String {
-    if (0.1..10_000.0).contains(value) { format!("{value}") } else { format!("1e{:.0}", value.log10()) }
+    if (0.1..10_000.0).contains(value) { format!("{value}") } else { format!("{value:.0e}") }
 }
 
 fn plain(value: &f64) -> String {

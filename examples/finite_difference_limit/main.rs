@@ -93,7 +93,9 @@ fn figure(path: &Path, records: &[Record]) -> Result<(), Box<dyn Error>> {
         let all = Case::ALL.into_iter().enumerate().map(curve);
         all.filter(|curve| !curve.points.is_empty()).collect::<Vec<_>>()
     };
-    let (mut miss, condition) = (curves(Outcome::miss), curves(Outcome::condition));
+    let (mut miss, mut condition) = (curves(Outcome::miss), curves(Outcome::condition));
+    // The legend of the first panel serves both.
+    condition.iter_mut().for_each(|curve| curve.name.clear());
     let approach = (0..=50).map(|i| 1.0 + 0.05 * f64::from(i)).map(|c| (c, (-c * c).exp())).collect();
     miss.push(Curve { name: "exp(-c^2)".into(), points: approach, mark: Mark::Line, color: 7 });
     let x = "c = h / epsilon";
@@ -101,7 +103,10 @@ fn figure(path: &Path, records: &[Record]) -> Result<(), Box<dyn Error>> {
         path,
         &[
             (Axes { title: "Distance from the finite difference", x, y: "largest miss", logarithmic: true }, miss),
-            (Axes { title: "Condition number in the certificate", x, y: "cond(B)", logarithmic: true }, condition),
+            (
+                Axes { title: "Condition number in the certificate, same colors", x, y: "cond(B)", logarithmic: true },
+                condition,
+            ),
         ],
     )
 }

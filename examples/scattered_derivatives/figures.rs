@@ -97,7 +97,7 @@ fn bars<'a>(svg: &'a mut String, finest: &[&Record]) -> Result<(), Box<dyn Error
         .margin(14)
         .x_label_area_size(46)
         .y_label_area_size(270)
-        .build_cartesian_2d(0.0..1.35, 0.0..count)?;
+        .build_cartesian_2d(0.0..1.6, 0.0..count)?;
     let name = |y: &f64| {
         let record = finest.get((count - y).floor().max(0.0) as usize);
         record
