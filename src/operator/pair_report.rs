@@ -48,9 +48,9 @@ impl<K, const N: usize> Pairwise<K, N> {
 
     /// M_alpha = sum_q V_q epsilon^-D z_q^alpha eta(z_q) of output n, images without their sign.
     fn moment<const D: usize>(&self, n: usize, alpha: MultiIndex<D>, scratch: &PairScratch<D>) -> f64 {
-        let pairs = scratch.z.iter().zip(&scratch.volume).enumerate();
+        let pairs = scratch.z.iter().zip(&scratch.volume).zip(scratch.eta_of(n));
         // Where the kernel underflows z^alpha may overflow: zero times infinity must not enter.
-        let weights = pairs.map(|(i, (z, volume))| (z, volume * scratch.eta[i * N + n]));
+        let weights = pairs.map(|((z, volume), eta)| (z, volume * eta));
         weights.filter(|&(_, weight)| weight != 0.0).map(|(z, weight)| weight * alpha.power(z)).sum()
     }
 
@@ -112,8 +112,7 @@ impl<K, const N: usize> Pairwise<K, N> {
         let mut bound = 0.0_f64;
         for (n, kernel) in self.kernels.iter().enumerate() {
             let sum = |map: fn(f64) -> f64| -> f64 {
-                let pairs = scratch.volume.iter().enumerate();
-                pairs.map(|(i, volume)| volume * map(scratch.eta[i * N + n])).sum()
+                scratch.volume.iter().zip(scratch.eta_of(n)).map(|(volume, &eta)| volume * map(eta)).sum()
             };
             let symmetric = self.pairing == Pairing::Difference && low == high;
             let whole = self.support >= kernel.support();

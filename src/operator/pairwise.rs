@@ -37,12 +37,20 @@ pub(super) struct Pairwise<K, const N: usize> {
     pub(super) allowance: Allowance,
 }
 
-/// Working memory: scaled separations, V_q epsilon^-D, and eta of every output, neighbor after neighbor.
+/// Working memory: scaled separations, V_q epsilon^-D, and eta at every neighbor, output after output.
 #[derive(Clone, Debug, Default)]
 pub struct PairScratch<const D: usize> {
     pub(super) z: Vec<[f64; D]>,
     pub(super) volume: Vec<f64>,
     pub(super) eta: Vec<f64>,
+}
+
+impl<const D: usize> PairScratch<D> {
+    /// eta of output n at every neighbor.
+    #[inline(always)]
+    pub(super) fn eta_of(&self, n: usize) -> &[f64] {
+        &self.eta[n * self.z.len()..][..self.z.len()]
+    }
 }
 
 impl<K, const N: usize> Pairwise<K, N> {
@@ -153,11 +161,11 @@ impl<K, const N: usize> Pairwise<K, N> {
             Pairing::Sum => 1.0,
             Pairing::Summation => 0.0,
         };
-        let pairs = w.iter_mut().zip(row.signs()).zip(&scratch.volume).zip(scratch.eta.chunks_exact(N));
-        for (((w, &sign), &volume), eta) in pairs {
-            let receiver = if self.strengths { own_volume } else { volume };
-            for n in 0..N {
-                let e = eta[n] * scale;
+        for n in 0..N {
+            let pairs = w.iter_mut().zip(row.signs()).zip(&scratch.volume).zip(scratch.eta_of(n));
+            for (((w, &sign), &volume), &eta) in pairs {
+                let receiver = if self.strengths { own_volume } else { volume };
+                let e = eta * scale;
                 let (weight, share) = spread(receiver * e, sigma * volume * e, sign);
                 w[n] = weight;
                 diagonal[n] += share;
@@ -171,7 +179,7 @@ impl<K, const N: usize> Pairwise<K, N> {
         finite(row, w, diagonal)
     }
 
-    /// eta of every output at every neighbor; one output needs no shuffling.
+    /// eta of every output at every neighbor.
     fn evaluate<const D: usize>(&self, scratch: &mut PairScratch<D>)
     where
         K: Kernel<f64, D>,
@@ -179,14 +187,8 @@ impl<K, const N: usize> Pairwise<K, N> {
         let PairScratch { z, eta, .. } = scratch;
         eta.clear();
         eta.resize(z.len() * N, 0.0);
-        if let [kernel] = self.kernels.as_slice() {
-            kernel.values(z, eta);
-            return;
-        }
-        for (z, eta) in z.iter().zip(eta.chunks_exact_mut(N)) {
-            for (kernel, eta) in self.kernels.iter().zip(eta) {
-                *eta = kernel.value(z);
-            }
+        for (n, kernel) in self.kernels.iter().enumerate() {
+            kernel.values(z, &mut eta[n * z.len()..][..z.len()]);
         }
     }
 }
