@@ -67,13 +67,17 @@ pub(super) fn worst<T: Scalar>(a: Residual<T>, b: Residual<T>) -> Residual<T> {
 }
 
 impl<T: Scalar> Solution<T> {
-    /// Whether the residual is rounding and nothing else: at most 4 l eps cond(B) max|b| and at most
-    /// 30 l eps max_alpha sum_q |w_q z_q^alpha|. NaN is not.
+    /// Whether the residual is rounding and nothing else: at most 4 l eps cond(B) max|b|, at most
+    /// 30 l eps max_alpha sum_q |w_q z_q^alpha|, and at most sqrt(eps) max|b|. NaN is not.
+    ///
+    /// Without the last bound a stencil that has rank by rounding alone would pass: its condition number and its
+    /// weights are so large that the first two allow anything.
     pub fn holds<const D: usize>(&self, system: &MomentSystem<T, D>) -> bool {
         let unit = T::default_epsilon() * T::lift(system.conditions() as f64);
         let Residual { absolute, terms } = self.residual;
         absolute <= T::lift(4.0) * unit * self.condition * system.largest_required()
             && absolute <= T::lift(30.0) * unit * terms
+            && absolute <= T::default_epsilon().sqrt() * system.largest_required()
     }
 
     /// Whether it is also as small as QR leaves it, 16 eps max_alpha sum_q |w_q z_q^alpha|: what is asked of the cheaper
