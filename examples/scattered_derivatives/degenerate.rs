@@ -103,12 +103,13 @@ where
     Ok(line)
 }
 
-/// The row applied to |x - x_p|^2 + sum_i (x - x_p)_i, of which the Laplacian is 2 D and the gradient (1, .., 1), against
-/// that.
+/// The row applied to |x - x_p|^2 + r_c sum_i (x - x_p)_i, of which the Laplacian is 2 D and the gradient
+/// (r_c, .., r_c), against that.
 fn miss<const D: usize, const K: usize>(operator: &str, row: &Stencil<D>, w: &[[f64; K]]) -> f64 {
+    let rc = row.cutoff();
     // f_p = 0, so that only the neighbors enter.
-    let f = |z: &[f64; D]| z.iter().map(|z| z * z - z).sum::<f64>();
-    let exact = if operator == "laplacian" { 2.0 * D as f64 } else { 1.0 };
+    let f = |z: &[f64; D]| z.iter().map(|z| z * z - rc * z).sum::<f64>();
+    let exact = if operator == "laplacian" { 2.0 * D as f64 } else { rc };
     let value = |k: usize| row.separations().iter().zip(w).map(|(z, w)| w[k] * f(z)).sum::<f64>();
     (0..K).map(|k| (value(k) - exact).abs() / exact).fold(0.0, f64::max)
 }
