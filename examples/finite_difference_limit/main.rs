@@ -11,46 +11,23 @@ mod claims;
 #[path = "../figure/mod.rs"]
 mod figure;
 mod limit;
+#[path = "../options/mod.rs"]
+mod options;
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 use figure::{Axes, Curve, Mark, draw};
 use limit::{Case, Outcome, Record};
-
-struct Options {
-    quick: bool,
-    out: PathBuf,
-}
-
-fn options() -> Result<Options, String> {
-    let mut options = Options { quick: false, out: PathBuf::from("target/report") };
-    let mut arguments = std::env::args().skip(1);
-    while let Some(argument) = arguments.next() {
-        match argument.as_str() {
-            "--quick" => options.quick = true,
-            "--out" => options.out = arguments.next().ok_or("--out needs a directory")?.into(),
-            other => return Err(format!("unknown argument {other}; known are --quick and --out DIR")),
-        }
-    }
-    Ok(options)
-}
+use options::Options;
 
 fn main() -> ExitCode {
-    match options().map_err(Into::into).and_then(|options| table(&options)) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(error) => {
-            eprintln!("finite_difference_limit: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    options::run("finite_difference_limit", table)
 }
 
 /// Runs every case; whether every claim holds.
 fn table(options: &Options) -> Result<bool, Box<dyn Error>> {
-    std::fs::create_dir_all(&options.out)?;
     let steps = if options.quick { 2 } else { 8 };
     let ratios: Vec<f64> = (0..=5 * steps / 2).map(|i| 1.0 + f64::from(i) / f64::from(steps)).collect();
     let mut records = Vec::new();

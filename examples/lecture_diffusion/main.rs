@@ -10,15 +10,17 @@ mod exchange;
 #[path = "../figure/mod.rs"]
 mod figure;
 mod figures;
+#[path = "../options/mod.rs"]
+mod options;
 mod random_walk;
 
 use std::error::Error;
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use benchmark::{D, DT, Record, T, X_RW, exact, norms};
 use exchange::{Outcome, Propagator, run};
+use options::Options;
 use random_walk::{centers, walk};
 
 /// Largest N for which the semi-discrete system is also propagated exactly.
@@ -28,39 +30,12 @@ const SEEDS: u64 = 10;
 /// The N of figure 5.1.
 const SHOWN: usize = 50;
 
-struct Options {
-    quick: bool,
-    out: PathBuf,
-}
-
-fn options() -> Result<Options, String> {
-    let mut options = Options { quick: false, out: PathBuf::from("target/report") };
-    let mut arguments = std::env::args().skip(1);
-    while let Some(argument) = arguments.next() {
-        match argument.as_str() {
-            "--quick" => options.quick = true,
-            "--out" => options.out = arguments.next().ok_or("--out needs a directory")?.into(),
-            other => return Err(format!("unknown argument {other}; known are --quick and --out DIR")),
-        }
-    }
-    Ok(options)
-}
-
 fn main() -> ExitCode {
-    let result = options().map_err(Into::into).and_then(|options| lecture(&options));
-    match result {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(error) => {
-            eprintln!("lecture_diffusion: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    options::run("lecture_diffusion", lecture)
 }
 
 /// Runs the benchmark; whether every claim holds.
 fn lecture(options: &Options) -> Result<bool, Box<dyn Error>> {
-    std::fs::create_dir_all(&options.out)?;
     let start = Instant::now();
     let finest = if options.quick { 400 } else { 1600 };
     let sizes: Vec<usize> = [25, 50, 100, 200, 400, 800, 1600].into_iter().filter(|&n| n <= finest).collect();

@@ -21,45 +21,22 @@ mod field;
 mod figure;
 mod figures;
 mod nearest;
+#[path = "../options/mod.rs"]
+mod options;
 mod sets;
 mod study;
 
 use std::error::Error;
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
+use options::Options;
 use parops::{D2, D3, Gradient, Laplacian, Operator};
 use sets::Set;
 use study::Record;
 
-struct Options {
-    quick: bool,
-    out: PathBuf,
-}
-
-fn options() -> Result<Options, String> {
-    let mut options = Options { quick: false, out: PathBuf::from("target/report") };
-    let mut arguments = std::env::args().skip(1);
-    while let Some(argument) = arguments.next() {
-        match argument.as_str() {
-            "--quick" => options.quick = true,
-            "--out" => options.out = arguments.next().ok_or("--out needs a directory")?.into(),
-            other => return Err(format!("unknown argument {other}; known are --quick and --out DIR")),
-        }
-    }
-    Ok(options)
-}
-
 fn main() -> ExitCode {
-    match options().map_err(Into::into).and_then(|options| study(&options)) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(error) => {
-            eprintln!("scattered_derivatives: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    options::run("scattered_derivatives", study)
 }
 
 /// Particles along an axis, refinement after refinement, for a dimension, an order and a degree.
@@ -84,7 +61,6 @@ fn sides(quick: bool, dim: usize, order: u32, degree: u32) -> &'static [usize] {
 
 /// Runs the study; whether every claim holds.
 fn study(options: &Options) -> Result<bool, Box<dyn Error>> {
-    std::fs::create_dir_all(&options.out)?;
     #[cfg(feature = "rayon")]
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     let start = Instant::now();
