@@ -133,6 +133,9 @@ where
                 .legend(move |(x, y)| legend(x, y, mark, color));
         }
     }
+    if curves.iter().all(|curve| curve.name.is_empty()) {
+        return Ok(());
+    }
     chart
         .configure_series_labels()
         .position(if axes.logarithmic { SeriesLabelPosition::LowerLeft } else { SeriesLabelPosition::UpperRight })
