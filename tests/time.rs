@@ -5,8 +5,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use nalgebra::{Complex, DVector, SVector, Vector3};
 use parops::{
-    Error, ErrorKind, Euler, Exponential, Leapfrog, ParticleError, Plan, Policy, Result, Rk4, State, StepLimit,
-    Stepper, TimeError, integrate,
+    Apply, CellList, Domain, Epsilon, Error, ErrorKind, Euler, Exponential, Laplacian, Leapfrog, ParticleError,
+    Particles, Plan, Policy, Pse, Result, Rk4, State, StepLimit, Stepper, TimeError, integrate,
 };
 use proptest::prelude::*;
 
@@ -590,4 +590,40 @@ fn exponential_refuses_illegal_matrices_states_and_times() {
     let zero = Exponential::new(2, |_, _| Ok(())).unwrap();
     zero.propagate(5.0, &mut sheared).unwrap();
     Exponential::new(0, |_, _| Ok(())).unwrap().propagate(1.0, &mut []).unwrap();
+}
+
+/// Diffusion on a ring, rows and all: du/dt = D Lap u by RK4, `steps` steps of `dt`.
+fn diffuse(u: &[f64], diffusivity: f64, dt: f64, steps: u32) -> Vec<f64> {
+    let ring = Particles::jittered([0.0], [1.0], [u.len()], 0.02, 3).unwrap();
+    let epsilon = Epsilon::global(2.0 / u.len() as f64).unwrap();
+    let pse = Pse::new(Laplacian::<1>, 4, epsilon, ring.volumes().unwrap()).unwrap();
+    let domain = Domain::periodic([0.0], [1.0]).unwrap();
+    let rows = pse.assemble(&CellList::build(&ring, &domain, pse.cutoff()).unwrap()).unwrap();
+    let limit = StepLimit::from_spectral_bound(rows.report().spectral_bound, diffusivity).unwrap();
+    let plan = Plan::new(0.0, dt * f64::from(steps), dt).unwrap().limit(limit);
+    let mut u = u.to_vec();
+    let rhs = |_, u: &Vec<f64>, du: &mut Vec<f64>| {
+        rows.apply(u, du)?;
+        du.iter_mut().for_each(|du| *du *= diffusivity);
+        Ok(())
+    };
+    let run = integrate(&mut Rk4::new(), &mut u, &plan, rhs, |_, _, _| {}).unwrap();
+    assert_eq!(run.steps, u64::from(steps));
+    u
+}
+
+#[test]
+fn scaling_the_field_or_time_against_diffusivity_by_powers_of_two_keeps_the_bits() {
+    // M14 of the metamorphic relations.
+    let start: Vec<f64> = (0..48).map(|p| (0.13 * f64::from(p)).sin() + 0.2).collect();
+    let (dt, steps) = (f64::exp2(-13.0), 32);
+    let reference = diffuse(&start, 0.5, dt, steps);
+    assert_ne!(reference, start);
+    for k in [-60, 17] {
+        let factor = f64::exp2(f64::from(k));
+        let scaled: Vec<f64> = start.iter().map(|u| u * factor).collect();
+        let expected: Vec<f64> = reference.iter().map(|u| u * factor).collect();
+        assert_eq!(diffuse(&scaled, 0.5, dt, steps), expected);
+        assert_eq!(diffuse(&start, 0.5 * factor, dt / factor, steps), reference);
+    }
 }
