@@ -149,7 +149,7 @@ impl<Op, const R: u32, S> DcPse<Op, R, S> {
         DcPse { operator, order, solver, window, sign, impose_zeroth, epsilon, neighbors_per_condition }
     }
 
-    /// The fewest neighbors a row of this operator must have.
+    /// The fewest nodes a row of this operator must have at a particle.
     ///
     /// # Errors
     /// As [`Method::scratch`].
@@ -157,9 +157,8 @@ impl<Op, const R: u32, S> DcPse<Op, R, S> {
     where
         Op: Operator<D>,
     {
-        let scratch = self.prepare::<D>()?;
-        let fewest = |system: &MomentSystem<f64, D>| self.fewest_for(system.conditions());
-        Ok(scratch.own.as_ref().map_or(0, fewest).max(if scratch.own.is_none() { fewest(&scratch.plain) } else { 0 }))
+        let DcPseScratch { own, plain, .. } = self.prepare::<D>()?;
+        Ok(self.fewest_for(own.unwrap_or(plain).conditions()))
     }
 
     fn fewest_for(&self, conditions: usize) -> usize {
