@@ -34,7 +34,9 @@
 mod apply;
 mod domain;
 mod error;
+mod exp;
 mod kernel;
+mod lanes;
 mod moment;
 mod multi_index;
 mod neighbors;
