@@ -2,11 +2,15 @@
 
 mod assemble;
 mod blocks;
+mod histogram;
 mod matrix_free;
 mod report;
 mod rows;
+mod splice;
 mod sweep;
+mod worker;
 
+pub use histogram::Histogram;
 pub use matrix_free::MatrixFree;
 pub use report::Report;
 pub use rows::{Row, Rows};
