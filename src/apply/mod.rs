@@ -2,6 +2,7 @@
 
 mod assemble;
 mod blocks;
+mod composed;
 mod matrix_free;
 mod report;
 mod rows;

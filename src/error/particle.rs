@@ -36,6 +36,11 @@ kinds! {
             /// The spacing.
             spacing: f64,
         } => "spacing {spacing} is not positive and finite",
+        /// A diffusivity that is negative or not finite.
+        Diffusivity {
+            /// The diffusivity.
+            diffusivity: f64,
+        } => "diffusivity {diffusivity} is negative or not finite",
         /// Two arrays that belong together have different lengths.
         Length {
             /// Length found.

@@ -1,6 +1,7 @@
 //! Operators as data, and methods: how a stencil becomes weights.
 
 mod dcpse;
+mod div_grad;
 mod expression;
 mod method;
 mod named;
@@ -11,6 +12,7 @@ mod sph;
 mod typed;
 
 pub use dcpse::{CUTOFF_OVER_EPSILON, DcPse, DcPseScratch};
+pub use div_grad::{DivGrad, Mean};
 pub use expression::{Expression, Operator, Outputs, ShowSum, Value};
 pub use method::{Allowance, Breach, Method, RowReport, Targets, spread};
 pub use named::{Along, Divergence, Gradient, Laplacian};
