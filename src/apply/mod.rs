@@ -7,10 +7,12 @@ mod matrix_free;
 mod report;
 mod rows;
 mod sweep;
+mod vector;
 
 pub use matrix_free::MatrixFree;
 pub use report::Report;
 pub use rows::{Row, Rows};
+pub use vector::Vector;
 
 use num_traits::AsPrimitive;
 
