@@ -60,7 +60,7 @@ pub use moment::{
 };
 pub use multi_index::*;
 pub use neighbors::{
-    BruteForce, Canonical, CellList, NeighborList, Neighbors, epsilon_from_neighbors, mean_neighbor_distance,
+    BruteForce, Canonical, CellList, Nearest, NeighborList, Neighbors, epsilon_from_neighbors, mean_neighbor_distance,
     volumes_from_neighbors,
 };
 pub use operator::*;

@@ -3,10 +3,9 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use parops::{DcPse, MultiIndex, Neighbors, Operator, Particles, Report};
+use parops::{DcPse, Domain, MultiIndex, Nearest, Neighbors, Operator, Particles, Report};
 
 use crate::field::{derivative, exact};
-use crate::nearest::Nearest;
 use crate::sets::Set;
 
 /// One line of the table.
@@ -60,9 +59,7 @@ where
     let count = points.len();
     let dcpse = DcPse::at_order(operator.clone(), order)?;
     let needed = dcpse.fewest_neighbors()?;
-    let h = (count as f64).powf(-1.0 / D as f64);
-    let first = 0.5 * h * (needed as f64).powf(1.0 / D as f64) / if set == Set::Clustered { 2.0 } else { 1.0 };
-    let neighbors = Nearest::build(particles, needed, first)?;
+    let neighbors = Nearest::build(particles, &Domain::open(), needed)?;
 
     let start = Instant::now();
     let mut rows = dcpse.assemble(&neighbors)?;
