@@ -1,7 +1,6 @@
 //! Operators applied to fields: stored rows, or weights made anew for every application.
 
 mod assemble;
-mod blocks;
 mod composed;
 mod fields;
 mod histogram;
