@@ -1,10 +1,10 @@
 //! Operators applied to fields: stored rows, or weights made anew for every application.
 
 mod assemble;
+pub(crate) mod blocks;
 mod composed;
 mod fields;
 mod histogram;
-pub(crate) mod blocks;
 mod matrix_free;
 mod report;
 mod rows;
