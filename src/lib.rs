@@ -34,7 +34,9 @@
 mod apply;
 mod domain;
 mod error;
+mod exp;
 mod kernel;
+mod lanes;
 mod linear;
 mod moment;
 mod multi_index;
