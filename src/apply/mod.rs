@@ -2,16 +2,26 @@
 
 mod assemble;
 pub(crate) mod blocks;
+mod composed;
 mod export;
+mod fields;
+mod histogram;
 mod matrix_free;
 mod report;
 mod rows;
+mod splice;
+mod strided;
 mod sweep;
+mod vector;
+mod worker;
 
 pub use export::RawRows;
+pub use histogram::Histogram;
 pub use matrix_free::MatrixFree;
 pub use report::Report;
 pub use rows::{Row, Rows};
+pub use strided::Strided;
+pub use vector::Vector;
 
 use num_traits::AsPrimitive;
 
