@@ -6,6 +6,7 @@ use crate::scalar::Scalar;
 
 /// Which method found the weights of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Rung {
     /// LU of A = B^T B, as in the notes.
