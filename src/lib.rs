@@ -35,6 +35,7 @@ mod apply;
 mod domain;
 mod error;
 mod kernel;
+mod linear;
 mod moment;
 mod multi_index;
 mod neighbors;
@@ -45,12 +46,13 @@ mod scale;
 mod stencil;
 mod time;
 
-pub use apply::{Apply, Field, MatrixFree, Report, Row, Rows};
+pub use apply::{Apply, Field, Histogram, MatrixFree, Report, Row, Rows, Strided, Vector};
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
 pub use error::*;
 pub use kernel::{
     ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Rational, SmoothingKernel, WideGaussian,
 };
+pub use linear::*;
 pub use moment::{
     CenterTerm, Cholesky, Ladder, Lu, MomentScratch, MomentSolver, MomentSystem, PivotedQr, Qr, Quadrature, Residual,
     Rung, Solution, Window, continuous_moment, continuous_moments, discrete_moment, discrete_moments,

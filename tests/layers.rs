@@ -12,6 +12,7 @@ const LAYERS: &[&[&str]] = &[
     &["operator"],
     &["domain", "particles", "neighbors"],
     &["apply"],
+    &["linear"],
     &["time"],
     &["solver"],
     &["report", "io"],

@@ -1,15 +1,25 @@
 //! Operators applied to fields: stored rows, or weights made anew for every application.
 
 mod assemble;
-mod blocks;
+mod composed;
+mod fields;
+mod histogram;
+pub(crate) mod blocks;
 mod matrix_free;
 mod report;
 mod rows;
+mod splice;
+mod strided;
 mod sweep;
+mod vector;
+mod worker;
 
+pub use histogram::Histogram;
 pub use matrix_free::MatrixFree;
 pub use report::Report;
 pub use rows::{Row, Rows};
+pub use strided::Strided;
+pub use vector::Vector;
 
 use num_traits::AsPrimitive;
 
@@ -42,7 +52,12 @@ pub trait Apply<T: Field>: Sync {
 }
 
 /// Checks a field and an output before anything is written.
-fn check<T: Field, In: AsRef<[T]>, Out>(f: &[In], sources: usize, out: &[Out], targets: usize) -> Result<()> {
+pub(crate) fn check<T: Field, In: AsRef<[T]>, Out>(
+    f: &[In],
+    sources: usize,
+    out: &[Out],
+    targets: usize,
+) -> Result<()> {
     if f.len() != sources {
         return Err(ApplyError::Input { found: f.len(), needed: sources }.into());
     }
@@ -57,7 +72,7 @@ fn check<T: Field, In: AsRef<[T]>, Out>(f: &[In], sources: usize, out: &[Out], t
 }
 
 /// Refuses results that are not finite, which a finite field and finite weights give only by overflow.
-fn check_results<T: Field, Out: AsRef<[T]>>(out: &[Out]) -> Result<()> {
+pub(crate) fn check_results<T: Field, Out: AsRef<[T]>>(out: &[Out]) -> Result<()> {
     let bad = |values: &Out| values.as_ref().iter().copied().find(|x| !x.is_finite());
     match out.iter().enumerate().find_map(|(p, values)| bad(values).map(|x| (p, x))) {
         Some((p, value)) => Err(Error::from(ApplyError::Overflow { value: value.as_() }).at(p)),
@@ -66,6 +81,6 @@ fn check_results<T: Field, Out: AsRef<[T]>>(out: &[Out]) -> Result<()> {
 }
 
 /// A scalar field seen as a field of one value per particle.
-fn scalars<T: Field>(f: &[T]) -> &[[T; 1]] {
+pub(crate) fn scalars<T: Field>(f: &[T]) -> &[[T; 1]] {
     f.as_chunks().0
 }

@@ -3,6 +3,7 @@
 mod apply;
 mod domain;
 mod kernel;
+mod linear;
 mod multi_index;
 mod neighbor;
 mod operator;
@@ -12,6 +13,7 @@ mod time;
 pub use apply::ApplyError;
 pub use domain::DomainError;
 pub use kernel::KernelError;
+pub use linear::LinearError;
 pub use multi_index::MultiIndexError;
 pub use neighbor::NeighborError;
 pub use operator::OperatorError;
@@ -52,25 +54,33 @@ pub type Result<T> = std::result::Result<T, Error>;
 pub struct Error {
     kind: ErrorKind,
     particle: Option<usize>,
+    wanted_cutoff: Option<f64>,
 }
 
 impl Error {
     /// An error of the given kind that concerns no particle in particular.
     pub fn new(kind: impl Into<ErrorKind>) -> Self {
-        Self { kind: kind.into(), particle: None }
+        Self { kind: kind.into(), particle: None, wanted_cutoff: None }
     }
 
     /// An error of the user's own, for right-hand sides, providers and methods outside this crate.
     ///
     /// `code` is handed back unchanged in [`ErrorKind::User`].
     pub fn user(code: i64) -> Self {
-        Self { kind: ErrorKind::User { code }, particle: None }
+        Self::new(ErrorKind::User { code })
     }
 
     /// Names the particle (or target) concerned.
     #[must_use]
     pub fn at(mut self, particle: usize) -> Self {
         self.particle = Some(particle);
+        self
+    }
+
+    /// Names the cutoff a neighbor provider should be built with before the call is tried again.
+    #[must_use]
+    pub fn wanting(mut self, cutoff: f64) -> Self {
+        self.wanted_cutoff = Some(cutoff);
         self
     }
 
@@ -83,6 +93,11 @@ impl Error {
     pub fn particle(&self) -> Option<usize> {
         self.particle
     }
+
+    /// The cutoff to build the neighbor provider with, where a wider one may help.
+    pub fn wanted_cutoff(&self) -> Option<f64> {
+        self.wanted_cutoff
+    }
 }
 
 impl fmt::Display for Error {
@@ -90,7 +105,17 @@ impl fmt::Display for Error {
         if let Some(particle) = self.particle {
             write!(f, "particle {particle}: ")?;
         }
-        match &self.kind {
+        self.kind.fmt(f)?;
+        match self.wanted_cutoff {
+            Some(cutoff) => write!(f, "; a provider built with the cutoff {cutoff} may serve"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for ErrorKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             ErrorKind::MultiIndex(kind) => kind.fmt(f),
             ErrorKind::Kernel(kind) => kind.fmt(f),
             ErrorKind::Domain(kind) => kind.fmt(f),
@@ -98,6 +123,7 @@ impl fmt::Display for Error {
             ErrorKind::Neighbor(kind) => kind.fmt(f),
             ErrorKind::Operator(kind) => kind.fmt(f),
             ErrorKind::Apply(kind) => kind.fmt(f),
+            ErrorKind::Linear(kind) => kind.fmt(f),
             ErrorKind::Time(kind) => kind.fmt(f),
             ErrorKind::User { code } => write!(f, "the caller's own error, code {code}"),
         }
@@ -124,6 +150,8 @@ pub enum ErrorKind {
     Operator(OperatorError),
     /// Applying rows to fields.
     Apply(ApplyError),
+    /// Sparse matrices and linear solves.
+    Linear(LinearError),
     /// Steppers and step limits.
     Time(TimeError),
     /// An error made by the caller's own code, see [`Error::user`].
@@ -156,5 +184,6 @@ from_kind! {
     Neighbor: NeighborError,
     Operator: OperatorError,
     Apply: ApplyError,
+    Linear: LinearError,
     Time: TimeError,
 }
