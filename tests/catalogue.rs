@@ -5,8 +5,8 @@ mod stencils;
 
 use nalgebra::DMatrix;
 use parops::{
-    CUTOFF_OVER_EPSILON, D1, D2, D3, DcPse, Domain, ErrorKind, Gradient, Laplacian, Nearest, Operator, OperatorError,
-    ParticleError, Particles, Random, Window,
+    CUTOFF_OVER_EPSILON, D1, D2, D3, DcPse, Domain, Epsilon, ErrorKind, Gradient, Laplacian, Nearest, Neighbors,
+    Operator, OperatorError, ParticleError, Particles, Random, Window,
 };
 use stencils::{Stencils, candidates, length, moments, monomials, terms};
 
@@ -162,7 +162,7 @@ fn verdict<const D: usize, const K: usize, Op: Operator<D, Out = [f64; K]> + Clo
                     ratio,
                     ..
                 }) => {
-                    assert!((ratio / CUTOFF_OVER_EPSILON - 1.0).abs() < 1e-12 && residual > 0.0 && condition > 1.0);
+                    assert!((ratio / CUTOFF_OVER_EPSILON - 1.0).abs() < 1e-12 && residual > 0.0 && condition > 0.0);
                     if rank < conditions {
                         Verdict::Deficient { neighbors, conditions, rank }
                     } else {
@@ -199,7 +199,7 @@ fn verdict<const D: usize, const K: usize, Op: Operator<D, Out = [f64; K]> + Clo
     Verdict::Accepted
 }
 
-/// cond(B), columns scaled to 1, by singular values.
+/// cond(B) of the windowed, scaled monomials by singular values.
 fn condition<const D: usize>(z: &[[f64; D]], odd: bool, low: u32, high: u32) -> f64 {
     let mut z = z.to_vec();
     if odd {
@@ -207,11 +207,7 @@ fn condition<const D: usize>(z: &[[f64; D]], odd: bool, low: u32, high: u32) -> 
     }
     let (alphas, columns) = monomials(&z, low, high);
     let root = |z: &[f64; D]| Window::Exponential.root(length(z).powi(2), f64::NAN);
-    let mut b = DMatrix::from_fn(z.len(), alphas.len(), |i, j| columns[j][i] * root(&z[i]));
-    for mut column in b.column_iter_mut() {
-        let norm = column.norm();
-        column /= norm;
-    }
+    let b = DMatrix::from_fn(z.len(), alphas.len(), |i, j| columns[j][i] * root(&z[i]));
     let values = b.singular_values();
     values.max() / values.min()
 }
@@ -264,4 +260,144 @@ fn accepted_rows_meet_their_bounds_alike_at_all_scales() {
     run("gradient", &Gradient::<3>, &[1, 2, 4]);
     run("laplacian", &Laplacian::<3>, &[2, 4]);
     run("mixed", &D3::<1, 1, 1>::default(), &[2]);
+}
+
+/// Every operator a stencil is tried with: rank that must be found, or none where the row must be accepted.
+fn must_be<const D: usize, const K: usize, Op: Operator<D, Out = [f64; K]> + Clone>(
+    operator: &Op,
+    order: u32,
+    points: &[[f64; D]],
+    rank: Option<usize>,
+) {
+    let found = at_all_scales(operator, order, points);
+    match (found, rank) {
+        (Verdict::Accepted, None) => {}
+        (Verdict::Deficient { neighbors, rank: found, .. }, Some(rank)) => {
+            assert_eq!((neighbors, found), (points.len(), rank));
+        }
+        _ => panic!("{found:?} where the rank is {rank:?}"),
+    }
+}
+
+/// Points spread at random along one parameter from -2 to 2.
+fn along<const D: usize>(count: usize, seed: u64, place: impl Fn(f64, &mut Random) -> [f64; D]) -> Vec<[f64; D]> {
+    let mut random = Random::new(seed);
+    (0..count)
+        .map(|_| {
+            let t = 4.0 * random.uniform() - 2.0;
+            place(t, &mut random)
+        })
+        .collect()
+}
+
+#[test]
+fn collinear_and_coplanar_points_are_refused_with_their_rank() {
+    for seed in 0..SEEDS {
+        // On a line through the target z, z^2, ... are what is left of all monomials, and of the gradient also 1.
+        let line = along(24, seed, |t, _| [0.6 * t, -0.8 * t]);
+        must_be(&Laplacian::<2>, 2, &line, Some(3));
+        must_be(&Gradient::<2>, 2, &line, Some(3));
+        must_be(&D2::<1, 1>::default(), 3, &along(30, seed, |t, _| [0.6 * t, -0.8 * t]), Some(4));
+        // Along an axis the monomials of the other vanish.
+        let axis = along(24, seed, |t, _| [t, 0.0]);
+        must_be(&Laplacian::<2>, 2, &axis, Some(3));
+        // In a plane through the target, those of two variables to degree 3 are left: 9, and 5 of degree at most 2, and 1.
+        let plane = along(60, seed, |t, random| {
+            let s = 4.0 * random.uniform() - 2.0;
+            [t, s, 0.5 * t - 0.25 * s]
+        });
+        must_be(&Laplacian::<3>, 2, &plane, Some(9));
+        must_be(&Gradient::<3>, 2, &plane, Some(6));
+        let line = along(60, seed, |t, _| [0.6 * t, -0.8 * t, 0.3 * t]);
+        must_be(&Laplacian::<3>, 2, &line, Some(3));
+    }
+}
+
+#[test]
+fn points_on_a_conic_are_refused_where_its_equation_is_among_the_conditions() {
+    for seed in 0..SEEDS {
+        // q = x^2/4 + y^2 - 1 vanishes on an ellipse around the target. Of the products that have no constant, x q and y q
+        // say nothing of a second derivative: rank 7 of 9, and weights nevertheless.
+        let ellipse = along(40, seed, |t, _| [2.0 * (1.5 * t).cos(), (1.5 * t).sin()]);
+        must_be(&Laplacian::<2>, 2, &ellipse, None);
+        // x^2 q and y^2 q do, and for the gradient x q and y q.
+        must_be(&Laplacian::<2>, 3, &ellipse, Some(9));
+        must_be(&Gradient::<2>, 3, &ellipse, Some(8));
+        // The target itself, which '+' counts, lies off the ellipse: no product of degree 2 vanishes on all nodes.
+        must_be(&Gradient::<2>, 2, &ellipse, None);
+        must_be(&Gradient::<2>, 2, &along(24, seed, |t, _| [t, t * t - 0.5 * t]), Some(5));
+        // A parabola through the target: y = x^2 - x/2 itself and its products with x and y.
+        must_be(&Laplacian::<2>, 2, &along(24, seed, |t, _| [t, t * t - 0.5 * t]), Some(6));
+    }
+}
+
+#[test]
+fn duplicates_count_as_one_place() {
+    for seed in 0..SEEDS {
+        let twice = |places: usize, count: usize| -> Vec<[f64; 2]> {
+            let points = Kind::Jittered(0.3).points::<2>(places, seed);
+            points.iter().cycle().take(count).copied().collect()
+        };
+        must_be(&Laplacian::<2>, 2, &twice(14, 28), None);
+        must_be(&Laplacian::<2>, 2, &twice(7, 21), Some(7));
+        must_be(&D1::<2>::default(), 2, &[[1.0]; 8], Some(1));
+        let mut on_target = twice(18, 18);
+        on_target.extend([[0.0; 2]; 6]);
+        must_be(&Laplacian::<2>, 2, &on_target, None);
+        must_be(&Gradient::<2>, 2, &on_target, None);
+    }
+}
+
+#[test]
+fn sets_far_from_the_origin_are_served_until_their_coordinates_are_illegal() {
+    // At 10^9 spacings a coordinate holds seven digits of a separation, which is exact as it stands.
+    for scale in SCALES {
+        let set = Particles::<2>::jittered([0.0; 2], [12.0; 2], [12; 2], 0.3, 3).unwrap();
+        let far = set.points().iter().map(|x| x.map(|x| (x + 1e9) * scale)).collect();
+        let far = match Particles::new(far) {
+            Ok(far) => far,
+            Err(error) => {
+                assert!(scale == 1e40 && error.particle() == Some(0));
+                assert!(matches!(error.kind(), ErrorKind::Particle(ParticleError::Range { axis: 0, .. })));
+                continue;
+            }
+        };
+        assert!(scale < 1e40);
+        let dcpse = DcPse::<Laplacian<2>, 2>::new();
+        let neighbors = Nearest::build(&far, &Domain::open(), dcpse.fewest_neighbors::<2>().unwrap()).unwrap();
+        let rows = dcpse.assemble(&neighbors).unwrap();
+        for p in 0..far.len() {
+            let row = rows.row(p).unwrap();
+            let epsilon = neighbors.cutoff(p) / CUTOFF_OVER_EPSILON;
+            let separation = |&q: &u32| std::array::from_fn(|i| far.points()[p][i] - far.points()[q as usize][i]);
+            let z: Vec<[f64; 2]> =
+                row.sources.iter().map(|q| separation(q).map(|x: f64| x * (1.0 / epsilon))).collect();
+            let (alphas, columns) = monomials(&z, 1, 3);
+            let found = moments(&row, 0, &terms(&Laplacian::<2>)[0], (&alphas, &columns), &z, epsilon);
+            assert!(found.residual() <= 30.0 * 9.0 * f64::EPSILON * found.terms);
+            assert!(found.residual() <= 4.0 * 9.0 * f64::EPSILON * 2.0 * condition(&z, false, 1, 3));
+        }
+    }
+}
+
+#[test]
+fn too_few_neighbors_and_windows_of_no_use_are_refused_alike_at_all_scales() {
+    let points = Kind::Jittered(0.3).points::<2>(17, 1);
+    for scale in SCALES {
+        let offsets: Vec<[f64; 2]> = points.iter().map(|x| x.map(|x| x * scale)).collect();
+        let cutoff = offsets.iter().map(length).fold(0.0, f64::max);
+        let stencils = Stencils { offsets: vec![offsets], cutoff };
+        let dcpse = DcPse::<Laplacian<2>, 2>::new();
+        let error = dcpse.assemble(&stencils).unwrap_err();
+        let ErrorKind::Operator(OperatorError::TooFew { neighbors, conditions, needed, .. }) = *error.kind() else {
+            panic!("{error}");
+        };
+        assert_eq!((error.particle(), neighbors, conditions, needed), (Some(0), 17, 9, 18));
+        for legal in [0.9, 7.0] {
+            let narrow = dcpse.clone().neighbors_per_condition(1.0).unwrap();
+            let error = narrow.epsilon(Epsilon::global(cutoff / legal).unwrap()).assemble(&stencils).unwrap_err();
+            let ErrorKind::Operator(OperatorError::Window { ratio, .. }) = *error.kind() else { panic!("{error}") };
+            assert!((ratio / legal - 1.0).abs() < 1e-12 && error.particle() == Some(0));
+        }
+    }
 }

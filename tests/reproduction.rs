@@ -42,7 +42,7 @@ impl<const D: usize, const K: usize> Operator<D> for OfDegree<K> {
     }
 }
 
-/// cond(B) by singular values, columns scaled to 1.
+/// cond(B) of the windowed, scaled monomials by singular values.
 fn condition<const D: usize>(z: &[[f64; D]], odd: bool, low: u32, high: u32) -> f64 {
     let mut z = z.to_vec();
     if odd {
@@ -50,11 +50,7 @@ fn condition<const D: usize>(z: &[[f64; D]], odd: bool, low: u32, high: u32) -> 
     }
     let (alphas, columns) = monomials(&z, low, high);
     let root = |z: &[f64; D]| Window::Exponential.root(length(z).powi(2), f64::NAN);
-    let mut b = DMatrix::from_fn(z.len(), alphas.len(), |i, j| columns[j][i] * root(&z[i]));
-    for mut column in b.column_iter_mut() {
-        let norm = column.norm();
-        column /= norm;
-    }
+    let b = DMatrix::from_fn(z.len(), alphas.len(), |i, j| columns[j][i] * root(&z[i]));
     let values = b.singular_values();
     values.max() / values.min()
 }

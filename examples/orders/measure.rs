@@ -22,23 +22,15 @@ impl<const D: usize, const K: usize> Operator<D> for OfDegree<K> {
     }
 }
 
-/// Which neighbors a row has.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Support {
-    /// The 2 l nearest of every particle, whole shells.
-    Nearest,
-    /// All within `DcPse::cutoff`, the same for every particle.
-    Even,
-}
-
 /// What is measured.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Series {
     pub set: Set,
-    pub support: Support,
+    /// One cutoff for all, `DcPse::cutoff`, in place of the 2 l nearest neighbors of each, whole shells.
+    pub even: bool,
     pub order: u32,
-    /// Particles along an axis.
-    pub sides: [usize; 4],
+    /// Particles along an axis, the coarsest set first; the order is fitted over all.
+    pub sides: Vec<usize>,
     /// kappa times the radius of a ball of 2 l particles on the coarsest set.
     pub wave: f64,
     /// Targets taken among particles that may touch a face and among the others, on every set.
@@ -83,7 +75,7 @@ struct Point {
     floor: f64,
 }
 
-/// What was observed of one multi-index: medians over the seeds.
+/// What was observed of one output: medians over the seeds.
 #[derive(Clone, Copy, Debug)]
 pub struct Observed {
     /// Orders in L2 and L-inf over particles whose stencil touches no face.
@@ -98,23 +90,31 @@ pub struct Observed {
     pub above_floor: f64,
 }
 
-/// What was observed of all multi-indices of one degree.
+/// What was observed of all outputs of an operator.
 pub struct Outcome<const K: usize> {
     pub outputs: [Observed; K],
     /// Moment conditions, and neighbors of a row in the mean.
     pub conditions: usize,
     pub neighbors: f64,
     pub rows: usize,
-    /// Rows with more neighbors than lie within their own cutoff.
+    /// Rows of a widened support.
     pub grown: usize,
 }
 
-/// Measures all derivatives of one degree with fields and weights of type T.
+/// Measures an operator of K outputs of one degree with fields and weights of type T.
 ///
 /// # Errors
 /// What the library refuses.
-pub fn observe<const D: usize, const K: usize, T: Field>(degree: u32, series: &Series) -> parops::Result<Outcome<K>> {
-    let dcpse = DcPse::at_order(OfDegree::<K>(degree), series.order)?;
+pub fn observe<const D: usize, const K: usize, T: Field>(
+    operator: impl Operator<D, Out = [f64; K]> + Clone,
+    series: &Series,
+) -> parops::Result<Outcome<K>> {
+    let (mut terms, mut degree) = (Vec::new(), 0);
+    operator.terms(&mut |k, beta, factor| {
+        terms.push((k, beta, factor));
+        degree = beta.degree();
+    });
+    let dcpse = DcPse::at_order(operator, series.order)?;
     let needed = dcpse.fewest_neighbors::<D>()?;
     let mut outcome =
         Outcome { outputs: [Observed::NONE; K], conditions: needed.div_ceil(2), neighbors: 0.0, rows: 0, grown: 0 };
@@ -129,17 +129,15 @@ pub fn observe<const D: usize, const K: usize, T: Field>(degree: u32, series: &S
             let (targets, weights) = stratified(&particles, radius, series.targets, seed);
             let places: Vec<[f64; D]> = targets.iter().map(|&p| particles.points()[p]).collect();
             let h = series.set.spacing::<D>(side, particles.len());
-            let target = Target { particles: &particles, targets: &targets, weights: &weights, degree, kappa, h };
-            points.push(match series.support {
-                Support::Nearest => {
-                    // A place finds its own particle too.
-                    let nearest = Nearest::build_at(&places, &particles, &Domain::open(), needed + 1)?;
-                    target.measure::<K, T>(&dcpse, &Chosen::new(nearest, targets.clone()), &mut outcome)?
-                }
-                Support::Even => {
-                    let cells = CellList::build_at(&places, &particles, &Domain::open(), dcpse.cutoff(&particles)?)?;
-                    target.measure::<K, T>(&dcpse, &Chosen::new(cells, targets.clone()), &mut outcome)?
-                }
+            let target =
+                Target { particles: &particles, targets: &targets, weights: &weights, terms: &terms, degree, kappa, h };
+            points.push(if series.even {
+                let cells = CellList::build_at(&places, &particles, &Domain::open(), dcpse.cutoff(&particles)?)?;
+                target.measure::<K, T>(&dcpse, &Chosen::new(cells, targets.clone()), &mut outcome)?
+            } else {
+                // A place finds its own particle too.
+                let nearest = Nearest::build_at(&places, &particles, &Domain::open(), needed + 1)?;
+                target.measure::<K, T>(&dcpse, &Chosen::new(nearest, targets.clone()), &mut outcome)?
             });
         }
         let slope = |error: fn(&Point) -> f64, k: usize| slope(points.iter().map(|p| (p[k].h, error(&p[k]))));
@@ -154,7 +152,7 @@ pub fn observe<const D: usize, const K: usize, T: Field>(degree: u32, series: &S
         for (k, observed) in outcome.outputs.iter_mut().enumerate() {
             let ratios = points.iter().map(|p| p[k].interior.l2 / p[k].floor);
             observed.above_floor = ratios.fold(observed.above_floor, f64::min);
-            observed.errors = [points[0][k].interior.l2, points[3][k].interior.l2];
+            observed.errors = [points[0][k].interior.l2, points[points.len() - 1][k].interior.l2];
         }
     }
     for (k, observed) in outcome.outputs.iter_mut().enumerate() {
@@ -221,6 +219,7 @@ struct Target<'a, const D: usize> {
     particles: &'a Particles<D>,
     targets: &'a [usize],
     weights: &'a [f64],
+    terms: &'a [(usize, MultiIndex<D>, f64)],
     degree: u32,
     kappa: f64,
     h: f64,
@@ -229,11 +228,12 @@ struct Target<'a, const D: usize> {
 impl<const D: usize> Target<'_, D> {
     fn measure<const K: usize, T: Field>(
         &self,
-        dcpse: &DcPse<OfDegree<K>>,
+        dcpse: &DcPse<impl Operator<D, Out = [f64; K]>>,
         neighbors: &impl Neighbors<D>,
         outcome: &mut Outcome<K>,
     ) -> parops::Result<[Point; K]> {
         let rows: Rows<[f64; K], T> = Rows::assemble(dcpse, neighbors)?;
+        outcome.grown += rows.report().grown;
         let squares = self.squares(&rows)?;
         let mut sums: [[Sum; 4]; K] = std::array::from_fn(|_| Default::default());
         for (i, &p) in self.targets.iter().enumerate() {
@@ -242,7 +242,6 @@ impl<const D: usize> Target<'_, D> {
             let Some(row) = rows.row(i) else { continue };
             outcome.rows += 1;
             outcome.neighbors += row.sources.len() as f64;
-            outcome.grown += usize::from(row.sources.len() > neighbors.count(i, cutoff));
             for (k, [interior, face, whole, floor]) in sums.iter_mut().enumerate() {
                 whole.add(self.weights[i], squares[i][k]);
                 if !inside {
@@ -269,9 +268,10 @@ impl<const D: usize> Target<'_, D> {
     fn squares<const K: usize, T: Field>(&self, rows: &Rows<[f64; K], T>) -> parops::Result<Vec<[f64; K]>> {
         let mut squares = vec![[0.0; K]; self.targets.len()];
         let mut out = vec![[T::zero(); K]; self.targets.len()];
-        let betas: Vec<MultiIndex<D>> = graded(self.degree, self.degree).collect();
         let directions = directions::<D>();
         for d in &directions {
+            let mut symbol = [0.0; K];
+            self.terms.iter().for_each(|&(k, beta, factor)| symbol[k] += factor * beta.power(d));
             let phase = |x: &[f64; D]| self.kappa * x.iter().zip(d).map(|(x, d)| x * d).sum::<f64>();
             for quarter in [0.0, 1.0] {
                 // Every derivative turns the wave by a quarter.
@@ -282,7 +282,7 @@ impl<const D: usize> Target<'_, D> {
                     let exact = wave(&self.particles.points()[p], quarter + f64::from(self.degree));
                     for k in 0..K {
                         let found: f64 = out[k].as_();
-                        let error = found * self.kappa.powi(-(self.degree as i32)) - betas[k].power(d) * exact;
+                        let error = found * self.kappa.powi(-(self.degree as i32)) - symbol[k] * exact;
                         squares[k] += error * error / directions.len() as f64;
                     }
                 }

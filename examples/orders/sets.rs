@@ -18,8 +18,6 @@ pub enum Set {
 const JITTER: f64 = 0.3;
 
 impl Set {
-    pub const ALL: [Self; 4] = [Self::Lattice, Self::Jittered, Self::QuasiRandom, Self::Boundary];
-
     pub fn name(self) -> &'static str {
         match self {
             Self::Lattice => "lattice",
@@ -38,18 +36,15 @@ impl Set {
     }
 
     /// About `side`^D particles.
+    ///
+    /// # Errors
+    /// None for a side of at least 2.
     pub fn particles<const D: usize>(self, side: usize, seed: u64) -> parops::Result<Particles<D>> {
         let (lower, upper) = ([0.0; D], [1.0; D]);
         match self {
             Self::Lattice => Particles::lattice(lower, upper, [side; D]),
             Self::Jittered => Particles::jittered(lower, upper, [side; D], JITTER, seed),
-            Self::QuasiRandom => {
-                // The sequence is similar to itself where N grows by its own ratio g, g^(D+1) = g + 1; between such
-                // numbers its gaps differ, and with them the constant of the error.
-                let ratio = [1.618_033_988_749_895_f64, 1.324_717_957_244_746, 1.220_744_084_605_76][D - 1];
-                let steps = ((side as f64).ln() * D as f64 / ratio.ln()).round();
-                Particles::quasi_random(lower, upper, ratio.powf(steps).round() as usize, seed)
-            }
+            Self::QuasiRandom => Particles::quasi_random(lower, upper, side.pow(D as u32), seed),
             Self::Boundary => {
                 // One cell more than gaps: the middles of the outermost cells are the faces.
                 let h = 1.0 / (side - 1) as f64;

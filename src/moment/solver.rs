@@ -70,11 +70,15 @@ impl<T: Scalar> Solution<T> {
     /// Whether the residual is rounding and nothing else: at most 4 l eps cond(B) max|b|, at most
     /// 30 l eps max_alpha sum_q |w_q z_q^alpha|, and at most sqrt(eps) max|b|, because where condition or weights reach
     /// 1/eps the first two say nothing. NaN is not.
+    ///
+    /// The estimate is of B with its columns scaled. Before that, cond(B) is at least
+    /// max_alpha sum_q |w_q z_q^alpha| / (sqrt(n) max|b|), which is the larger one on slivers.
     pub fn holds<const D: usize>(&self, system: &MomentSystem<T, D>) -> bool {
         let eps = T::default_epsilon();
         let unit = eps * T::lift(system.conditions() as f64);
         let Residual { absolute, terms } = self.residual;
-        absolute <= T::lift(4.0) * unit * self.condition * system.largest_required()
+        let unscaled = terms / T::lift(system.neighbors() as f64).sqrt();
+        absolute <= T::lift(4.0) * unit * (self.condition * system.largest_required()).max(unscaled)
             && absolute <= T::lift(30.0) * unit * terms
             && absolute <= eps.sqrt() * system.largest_required()
     }

@@ -62,8 +62,8 @@ pub struct Moments {
     pub terms: f64,
     /// sum_q |w_q|.
     pub sum_abs: f64,
-    /// A lower bound on the condition number of the windowed monomials, columns scaled to 1: with y = B (B^T B)^-1 b the
-    /// smallest singular value is at most |b| / |y|, and the largest at least 1.
+    /// A lower bound on the condition number of the windowed monomials B: with y = B (B^T B)^-1 b the smallest singular
+    /// value is at most |b| / |y|, and the largest at least the norm of a column.
     pub condition: f64,
 }
 
@@ -106,7 +106,8 @@ pub fn moments<const D: usize, const K: usize>(
     // The self weight is what the diagonal 2 (sum_q w_q + w_self) leaves.
     let own = if odd { 0.5 * row.diagonal[k] * back - w.iter().sum::<f64>() } else { 0.0 };
     let length = w.iter().zip(&roots).fold(own * own, |sum, (w, root)| sum + (w / root).powi(2)).sqrt();
-    let (mut found, mut required_length) = (Moments { misses: vec![], terms: 0.0, sum_abs: 0.0, condition: 1.0 }, 0.0);
+    let mut found = Moments { misses: vec![], terms: 0.0, sum_abs: 0.0, condition: 1.0 };
+    let (mut required_length, mut longest) = (0.0, 0.0_f64);
     for (&alpha, column) in alphas.iter().zip(columns) {
         let required = required_moment(terms, alpha).unwrap();
         let (mut sum, mut size) = (0.0, 0.0);
@@ -115,7 +116,8 @@ pub fn moments<const D: usize, const K: usize>(
             size += (w * z).abs();
         }
         let norm = column.iter().zip(&roots).fold(0.0, |sum, (z, root)| sum + (z * root).powi(2)).sqrt();
-        required_length += (required / norm).powi(2);
+        longest = longest.max(norm);
+        required_length += required * required;
         if odd && alpha == MultiIndex::ZERO {
             (sum, size) = (0.5 * row.diagonal[k] * back, size + own.abs());
         }
@@ -123,7 +125,7 @@ pub fn moments<const D: usize, const K: usize>(
         found.terms = found.terms.max(size);
     }
     found.sum_abs = w.iter().map(|w| w.abs()).sum::<f64>() + own.abs();
-    found.condition = (length / required_length.sqrt()).max(1.0);
+    found.condition = (length * longest / required_length.sqrt()).max(1.0);
     found
 }
 
