@@ -114,7 +114,7 @@ where
         order,
         particles: count,
         interior: interior.count,
-        conditions: report.worst.map_or(0, |row| row.conditions),
+        conditions: report.worst().map_or(0, |row| row.conditions),
         neighbors: report.pairs as f64 / count as f64,
         l2: interior.l2(),
         linf: interior.largest / interior.largest_exact,

@@ -4,13 +4,17 @@ mod assemble;
 mod blocks;
 mod composed;
 mod fields;
+mod histogram;
 mod matrix_free;
 mod report;
 mod rows;
+mod splice;
 mod strided;
 mod sweep;
 mod vector;
+mod worker;
 
+pub use histogram::Histogram;
 pub use matrix_free::MatrixFree;
 pub use report::Report;
 pub use rows::{Row, Rows};
