@@ -231,15 +231,19 @@ fn flux_through_a_jump_is_right_with_the_harmonic_mean_and_several_times_worse_w
     Ok(())
 }
 
-/// The largest real part of an eigenvalue over the largest modulus, on a torus with a layer of D = `contrast`.
-fn growth(r: u32, mean: Mean, contrast: f64, seed: u64) -> Result<(f64, Rows), parops::Error> {
-    let particles = Particles::jittered([0.0; 2], [1.0; 2], [14; 2], 0.3, seed)?;
+/// What a torus with a layer of D = `contrast` gives: the largest real part of an eigenvalue over the largest modulus,
+/// the rows, and how many of them reach over a face of the layer.
+fn growth(r: u32, mean: Mean, contrast: f64, seed: u64) -> Result<(f64, Rows, usize), parops::Error> {
+    let particles = Particles::jittered([0.0; 2], [1.0; 2], [20; 2], 0.3, seed)?;
     let (dcpse, neighbors) = on_torus(&particles, r)?;
-    let diffusivity = sampled(&particles, |x| if (0.25..0.75).contains(&x[0]) { contrast } else { 1.0 });
-    let rows = DivGrad::new(dcpse, diffusivity)?.mean(mean).assemble(&neighbors)?;
+    let diffusivity = sampled(&particles, |x| if x[0] < 0.5 { contrast } else { 1.0 });
+    let rows = DivGrad::new(dcpse, diffusivity.clone())?.mean(mean).assemble(&neighbors)?;
+    let mixed = |p: &usize| rows.row(*p).unwrap().sources.iter().any(|&q| diffusivity[q as usize] != diffusivity[*p]);
+    let mixed = (0..rows.targets()).filter(mixed).count();
     let values = dense(&rows).complex_eigenvalues();
     let largest = values.iter().map(|value| value.norm()).fold(0.0, f64::max);
-    Ok((values.iter().map(|value| value.re).fold(f64::NEG_INFINITY, f64::max) / largest, rows))
+    let growing = values.iter().map(|value| value.re).fold(f64::NEG_INFINITY, f64::max);
+    Ok((growing / largest, rows, mixed))
 }
 
 #[test]
@@ -247,19 +251,23 @@ fn order_four_with_the_arithmetic_mean_grows_across_a_contrast_of_100_and_nothin
     // Constants have eigenvalue zero: their rounding, over the largest eigenvalue.
     const ZERO: f64 = 1e-12;
     for seed in 0..3 {
-        let (growing, _) = growth(4, Mean::Arithmetic, 100.0, seed)?;
-        println!("seed {seed}: {growing:.2e} of the largest");
+        let (growing, rows, mixed) = growth(4, Mean::Arithmetic, 100.0, seed)?;
+        println!("seed {seed}: {growing:.2e} of the largest, {mixed} of {} rows reach across", rows.targets());
         assert!(growing > 1e-3, "seed {seed}: {growing}");
-        for (r, mean, contrast) in [
-            (2, Mean::Arithmetic, 100.0),
-            (2, Mean::Harmonic, 100.0),
-            (4, Mean::Harmonic, 100.0),
-            (4, Mean::Arithmetic, 10.0),
-            (4, Mean::Arithmetic, 1.0),
-        ] {
-            let (stable, _) = growth(r, mean, contrast, seed)?;
-            assert!(stable < ZERO, "seed {seed}, r = {r}, {mean:?}, contrast {contrast}: {stable}");
-        }
+        let report = rows.report();
+        assert_eq!((report.contrast, report.growing), (100.0, mixed));
+        assert!(0 < mixed && mixed < rows.targets());
+    }
+    for (r, mean, contrast) in [
+        (2, Mean::Arithmetic, 100.0),
+        (2, Mean::Harmonic, 100.0),
+        (4, Mean::Harmonic, 100.0),
+        (4, Mean::Arithmetic, 10.0),
+        (4, Mean::Arithmetic, 1.0),
+    ] {
+        let (stable, rows, _) = growth(r, mean, contrast, 0)?;
+        assert_eq!((rows.report().contrast, rows.report().growing), (contrast, 0));
+        assert!(stable < ZERO, "r = {r}, {mean:?}, contrast {contrast}: {stable}");
     }
     Ok(())
 }
