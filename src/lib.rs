@@ -28,13 +28,18 @@
 //! ```
 //!
 //! # Features
+//! `faer`: sparse LU for coupled boundary conditions and steady problems; matrices as those of that package.
 //! `rayon`: rows are built and applied by several threads, with the same bits for any number of them.
+//! `serde`: rows and reports saved and read back bit for bit.
 //! `testing`: conformance checkers for kernels, providers, methods and steppers, ours and the user's own.
 
 mod apply;
 mod domain;
 mod error;
+mod exp;
 mod kernel;
+mod lanes;
+mod linear;
 mod moment;
 mod multi_index;
 mod neighbors;
@@ -45,12 +50,13 @@ mod scale;
 mod stencil;
 mod time;
 
-pub use apply::{Apply, Field, Histogram, MatrixFree, Report, Row, Rows, Strided, Vector};
+pub use apply::{Apply, Field, Histogram, MatrixFree, RawRows, Report, Row, Rows, Strided, Vector};
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
 pub use error::*;
 pub use kernel::{
     ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Rational, SmoothingKernel, WideGaussian,
 };
+pub use linear::*;
 pub use moment::{
     CenterTerm, Cholesky, Ladder, Lu, MomentScratch, MomentSolver, MomentSystem, PivotedQr, Qr, Quadrature, Residual,
     Rung, Solution, Window, continuous_moment, continuous_moments, discrete_moment, discrete_moments,
@@ -58,7 +64,7 @@ pub use moment::{
 };
 pub use multi_index::*;
 pub use neighbors::{
-    BruteForce, Canonical, CellList, NeighborList, Neighbors, epsilon_from_neighbors, mean_neighbor_distance,
+    BruteForce, Canonical, CellList, Nearest, NeighborList, Neighbors, epsilon_from_neighbors, mean_neighbor_distance,
     volumes_from_neighbors,
 };
 pub use operator::*;

@@ -5,13 +5,14 @@ use std::{env, fs};
 
 /// The layers in order; the modules of one entry may use each other.
 const LAYERS: &[&[&str]] = &[
-    &["scalar", "stencil", "scale", "error"],
+    &["scalar", "lanes", "exp", "stencil", "scale", "error"],
     &["multi_index"],
     &["kernel"],
     &["moment"],
     &["operator"],
     &["domain", "particles", "neighbors"],
     &["apply"],
+    &["linear"],
     &["time"],
     &["solver"],
     &["report", "io"],

@@ -3,10 +3,9 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use parops::{DcPse, MultiIndex, Neighbors, Operator, Particles, Report};
+use parops::{DcPse, Domain, Histogram, MultiIndex, Nearest, Neighbors, Operator, Particles, Report};
 
 use crate::field::{derivative, exact};
-use crate::nearest::Nearest;
 use crate::sets::Set;
 
 /// One line of the table.
@@ -39,6 +38,9 @@ pub struct Record {
     pub condition: f64,
     pub residual: f64,
     pub rungs: [usize; 5],
+    /// Rows per decade.
+    pub condition_spread: Histogram,
+    pub residual_spread: Histogram,
 }
 
 /// Builds are repeated until they have taken this long together, three times at most; the fastest counts.
@@ -60,9 +62,7 @@ where
     let count = points.len();
     let dcpse = DcPse::at_order(operator.clone(), order)?;
     let needed = dcpse.fewest_neighbors()?;
-    let h = (count as f64).powf(-1.0 / D as f64);
-    let first = 0.5 * h * (needed as f64).powf(1.0 / D as f64) / if set == Set::Clustered { 2.0 } else { 1.0 };
-    let neighbors = Nearest::build(particles, needed, first)?;
+    let neighbors = Nearest::build(particles, &Domain::open(), needed)?;
 
     let start = Instant::now();
     let mut rows = dcpse.assemble(&neighbors)?;
@@ -128,6 +128,8 @@ where
         condition: report.condition,
         residual: report.residual,
         rungs: report.rungs,
+        condition_spread: report.conditions,
+        residual_spread: report.residuals,
     })
 }
 

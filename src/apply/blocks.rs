@@ -44,7 +44,7 @@ pub(super) fn each_part<T: Send>(
 }
 
 /// Applies row after row to an output, block by block.
-pub(super) fn each_row<T: Send>(out: &mut [T], row: impl Fn(usize) -> T + Sync + Send) {
+pub(crate) fn each_row<T: Send>(out: &mut [T], row: impl Fn(usize) -> T + Sync + Send) {
     let block = |(b, out): (usize, &mut [T])| {
         for (i, out) in out.iter_mut().enumerate() {
             *out = row(b * BLOCK + i);

@@ -3,6 +3,7 @@
 mod apply;
 mod domain;
 mod kernel;
+mod linear;
 mod multi_index;
 mod neighbor;
 mod operator;
@@ -12,6 +13,7 @@ mod time;
 pub use apply::ApplyError;
 pub use domain::DomainError;
 pub use kernel::KernelError;
+pub use linear::LinearError;
 pub use multi_index::MultiIndexError;
 pub use neighbor::NeighborError;
 pub use operator::OperatorError;
@@ -121,6 +123,7 @@ impl fmt::Display for ErrorKind {
             ErrorKind::Neighbor(kind) => kind.fmt(f),
             ErrorKind::Operator(kind) => kind.fmt(f),
             ErrorKind::Apply(kind) => kind.fmt(f),
+            ErrorKind::Linear(kind) => kind.fmt(f),
             ErrorKind::Time(kind) => kind.fmt(f),
             ErrorKind::User { code } => write!(f, "the caller's own error, code {code}"),
         }
@@ -147,6 +150,8 @@ pub enum ErrorKind {
     Operator(OperatorError),
     /// Applying rows to fields.
     Apply(ApplyError),
+    /// Sparse matrices and linear solves.
+    Linear(LinearError),
     /// Steppers and step limits.
     Time(TimeError),
     /// An error made by the caller's own code, see [`Error::user`].
@@ -179,5 +184,6 @@ from_kind! {
     Neighbor: NeighborError,
     Operator: OperatorError,
     Apply: ApplyError,
+    Linear: LinearError,
     Time: TimeError,
 }

@@ -1,0 +1,325 @@
+//! Restarted GMRES with an incomplete factor on the right.
+
+use super::ilu::{Ilu0, check_length};
+use crate::apply::Apply;
+use crate::error::{ApplyError, Error, LinearError, Result};
+use crate::particles::reserved;
+
+/// What a solve of A x = b did.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct SolveReport {
+    /// Products with A, those for the final residual not counted; steps of refinement where A was factored.
+    pub iterations: usize,
+    /// The relative residual |b - A x|_2 / |b|_2, computed from x itself; 0 for b = 0.
+    pub residual: f64,
+}
+
+/// GMRES(m): the x of least residual |b - A x|_2 in a growing Krylov space, restarted every m iterations.
+///
+/// The preconditioner stands on the right, A M^-1 (M x) = b, so that the residual minimized is the true one. It is
+/// computed anew from x at every restart, and that decides. Vectors are made orthogonal twice (modified Gram-Schmidt), so
+/// residuals near rounding can be reached. The start is x = 0, and b is scaled by a power of two, so that equal input
+/// gives equal bits and 2^k b gives 2^k x. Memory for m + 1 vectors is reserved in the first solve of a size, filled as
+/// far as iterations need it, and reused.
+///
+/// Defaults: m = 60, at most 3000 iterations, relative residual 1e-13. A system whose |A| |x| is far above |b| cannot get
+/// there in `f64`; [`SparseSolver`](crate::SparseSolver) knows where rounding ends.
+///
+/// ```
+/// use parops::{CsrMatrix, Gmres, Ilu0};
+/// let chain = (0..50).flat_map(|i: usize| [(i, i, 2.0), (i, (i + 1) % 50, -1.0), (i, (i + 49) % 50, -0.5)]);
+/// let a = CsrMatrix::from_triplets(50, 50, chain)?;
+/// let mut x = [0.0; 50];
+/// let report = Gmres::new().solve(&a, Some(&Ilu0::new(&a)?), &[1.0; 50], &mut x)?;
+/// assert!(report.residual <= 1e-13 && (x[7] - 2.0).abs() < 1e-12);
+/// # parops::Result::Ok(())
+/// ```
+///
+/// Source: Y. Saad and M. H. Schultz, 1986; right preconditioning as in Saad, Iterative Methods, 2003, algorithm 9.5.
+#[derive(Clone, Debug)]
+pub struct Gmres {
+    restart: usize,
+    most: usize,
+    tolerance: f64,
+    /// The orthonormal vectors, one after the other.
+    basis: Vec<f64>,
+    /// The triangular factor of the projected matrix, column by column, m + 1 places each.
+    triangle: Vec<f64>,
+    rotations: Vec<[f64; 2]>,
+    /// The right-hand side of the projected problem, then its solution.
+    small: Vec<f64>,
+    work: Vec<f64>,
+    scaled: Vec<f64>,
+}
+
+impl Default for Gmres {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Gmres {
+    /// The solver at its defaults.
+    pub fn new() -> Self {
+        Self {
+            restart: 60,
+            most: 3000,
+            tolerance: 1e-13,
+            basis: Vec::new(),
+            triangle: Vec::new(),
+            rotations: Vec::new(),
+            small: Vec::new(),
+            work: Vec::new(),
+            scaled: Vec::new(),
+        }
+    }
+
+    /// With a restart after so many iterations, at least 1.
+    #[must_use]
+    pub fn restart(self, iterations: usize) -> Self {
+        Self { restart: iterations.max(1), ..self }
+    }
+
+    /// With at most so many iterations.
+    #[must_use]
+    pub fn most(self, iterations: usize) -> Self {
+        Self { most: iterations, ..self }
+    }
+
+    /// With this relative residual to be reached.
+    ///
+    /// # Errors
+    /// [`LinearError::Setting`] where it is not in (0, 1).
+    pub fn tolerance(self, residual: f64) -> Result<Self> {
+        if residual > 0.0 && residual < 1.0 {
+            Ok(Self { tolerance: residual, ..self })
+        } else {
+            Err(LinearError::Setting { value: residual, low: 0.0, high: 1.0 }.into())
+        }
+    }
+
+    /// Solves A x = b from x = 0, for a matrix or any other operator with as many targets as sources.
+    ///
+    /// # Errors
+    /// [`LinearError::NotSquare`] and [`LinearError::Length`] where shapes do not fit; [`LinearError::Value`] naming the
+    /// first entry of `b` that is not finite; [`LinearError::NotConverged`] where the residual is above the tolerance
+    /// after the last iteration, or when a restart no longer lowers it (`x` then holds what was reached);
+    /// [`ApplyError::Overflow`] where the solution is not finite; and the errors of the operator.
+    pub fn solve(
+        &mut self,
+        a: &(impl Apply<f64> + ?Sized),
+        preconditioner: Option<&Ilu0>,
+        b: &[f64],
+        x: &mut [f64],
+    ) -> Result<SolveReport> {
+        let (rows, columns) = (a.targets(), a.sources());
+        if rows != columns {
+            return Err(LinearError::NotSquare { rows, columns }.into());
+        }
+        check_length(preconditioner.map_or(rows, Ilu0::rows), rows)?;
+        check_length(b.len(), rows)?;
+        let precondition = |x: &mut [f64]| preconditioner.map_or(Ok(()), |factors| factors.solve(x));
+        let report = self.run(|x, y| a.apply(x, y), precondition, b, x)?;
+        self.accept(report)
+    }
+
+    /// Refuses a report above the tolerance.
+    pub(super) fn accept(&self, report: SolveReport) -> Result<SolveReport> {
+        let (SolveReport { iterations, residual }, tolerance) = (report, self.tolerance);
+        if residual <= tolerance {
+            Ok(report)
+        } else {
+            Err(LinearError::NotConverged { iterations, residual, tolerance }.into())
+        }
+    }
+
+    /// Iterates until the tolerance, the last iteration, or until nothing is gained; the report says how far it came.
+    pub(super) fn run(
+        &mut self,
+        product: impl Fn(&[f64], &mut [f64]) -> Result<()>,
+        precondition: impl Fn(&mut [f64]) -> Result<()>,
+        b: &[f64],
+        x: &mut [f64],
+    ) -> Result<SolveReport> {
+        let n = b.len();
+        check_length(x.len(), n)?;
+        if let Some((p, &value)) = b.iter().enumerate().find(|(_, value)| !value.is_finite()) {
+            return Err(Error::from(LinearError::Value { value }).at(p));
+        }
+        x.fill(0.0);
+        let largest = b.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        if largest == 0.0 {
+            return Ok(SolveReport::default());
+        }
+        self.reserve(n)?;
+        let scale = inverse_power(largest);
+        self.scaled.clear();
+        self.scaled.extend(b.iter().map(|value| value * scale));
+        let full = norm(&self.scaled);
+        let goal = self.tolerance * full;
+        self.basis.clear();
+        self.basis.extend_from_slice(&self.scaled);
+        let (mut left, mut iterations) = (full, 0);
+        while left > goal && iterations < self.most {
+            let steps = self.cycle(left, goal, self.most - iterations, &product, &precondition)?;
+            iterations += steps.done;
+            self.combine(n, steps.kept);
+            precondition(&mut self.work)?;
+            x.iter_mut().zip(&self.work).for_each(|(x, step)| *x += step);
+            product(x, &mut self.work)?;
+            self.basis.clear();
+            self.basis.extend(self.scaled.iter().zip(&self.work).map(|(b, ax)| b - ax));
+            let before = left;
+            left = norm(&self.basis);
+            // Where the small problem was solved and the residual stays, what is left is rounding.
+            let gained = left < if steps.solved { 0.5 * before } else { before };
+            if !gained {
+                break;
+            }
+        }
+        x.iter_mut().for_each(|x| *x /= scale);
+        if let Some((p, &value)) = x.iter().enumerate().find(|(_, value)| !value.is_finite()) {
+            return Err(Error::from(ApplyError::Overflow { value }).at(p));
+        }
+        Ok(SolveReport { iterations, residual: left / full })
+    }
+
+    /// The most vectors of one cycle that take part in a solution.
+    fn width(&self, n: usize) -> usize {
+        self.restart.min(self.most).min(n)
+    }
+
+    /// Room for all that a solve of n unknowns can need.
+    fn reserve(&mut self, n: usize) -> Result<()> {
+        let m = self.width(n);
+        let wanted = n.saturating_mul(m + 1);
+        if self.basis.capacity() < wanted {
+            self.basis = reserved(wanted)?;
+        }
+        if self.triangle.len() < m * (m + 1) {
+            self.triangle.resize(m * (m + 1), 0.0);
+            self.rotations.resize(m, [0.0; 2]);
+            self.small.resize(m + 1, 0.0);
+        }
+        self.work.resize(n, 0.0);
+        self.scaled.reserve(n);
+        Ok(())
+    }
+
+    /// One cycle from the residual that is the first vector of the basis.
+    fn cycle(
+        &mut self,
+        residual: f64,
+        goal: f64,
+        most: usize,
+        product: &impl Fn(&[f64], &mut [f64]) -> Result<()>,
+        precondition: &impl Fn(&mut [f64]) -> Result<()>,
+    ) -> Result<Steps> {
+        let n = self.work.len();
+        let m = self.width(n);
+        self.basis.iter_mut().for_each(|value| *value /= residual);
+        self.small.fill(0.0);
+        self.small[0] = residual;
+        let mut j = 0;
+        while j < m.min(most) {
+            self.work.copy_from_slice(&self.basis[j * n..]);
+            precondition(&mut self.work)?;
+            self.basis.resize((j + 2) * n, 0.0);
+            let (known, next) = self.basis.split_at_mut((j + 1) * n);
+            product(&self.work, next)?;
+            let column = &mut self.triangle[j * (m + 1)..][..j + 2];
+            let before = norm(next);
+            orthogonalize(known, next, &mut column[..=j]);
+            let length = norm(next);
+            // What is left of a vector inside the space is rounding: the space holds the solution, or A is singular.
+            let closed = !(length > 4.0 * f64::EPSILON * before);
+            column[j + 1] = if closed { 0.0 } else { length };
+            next.iter_mut().for_each(|value| *value /= length);
+            for (i, &[c, s]) in self.rotations[..j].iter().enumerate() {
+                (column[i], column[i + 1]) = (c * column[i] + s * column[i + 1], c * column[i + 1] - s * column[i]);
+            }
+            let pivot = column[j].hypot(column[j + 1]);
+            if !(pivot > f64::EPSILON * before) {
+                // The last direction is mapped to nothing that is new: it cannot help.
+                return Ok(Steps { done: j + 1, kept: j, solved: false });
+            }
+            let [c, s] = [column[j] / pivot, column[j + 1] / pivot];
+            (column[j], self.rotations[j]) = (pivot, [c, s]);
+            (self.small[j], self.small[j + 1]) = (c * self.small[j], -s * self.small[j]);
+            j += 1;
+            if closed || self.small[j].abs() <= goal {
+                return Ok(Steps { done: j, kept: j, solved: true });
+            }
+        }
+        Ok(Steps { done: j, kept: j, solved: false })
+    }
+
+    /// The combination of the first `kept` basis vectors that solves the projected problem, into `work`.
+    fn combine(&mut self, n: usize, kept: usize) {
+        let stride = self.width(n) + 1;
+        for j in (0..kept).rev() {
+            let column = &self.triangle[j * stride..][..=j];
+            let y = self.small[j] / column[j];
+            self.small[j] = y;
+            self.small[..j].iter_mut().zip(column).for_each(|(small, entry)| *small -= entry * y);
+        }
+        self.work.fill(0.0);
+        for (vector, &y) in self.basis.chunks_exact(n).zip(&self.small[..kept]) {
+            self.work.iter_mut().zip(vector).for_each(|(sum, value)| *sum += y * value);
+        }
+    }
+}
+
+/// What one cycle did.
+struct Steps {
+    done: usize,
+    /// Vectors that take part in the solution.
+    kept: usize,
+    /// Whether the projected residual reached the goal.
+    solved: bool,
+}
+
+/// Takes from `next` its parts along the known vectors, twice, and sums them in `parts`.
+fn orthogonalize(known: &[f64], next: &mut [f64], parts: &mut [f64]) {
+    parts.fill(0.0);
+    for _ in 0..2 {
+        for (vector, part) in known.chunks_exact(next.len()).zip(&mut *parts) {
+            let along = dot(vector, next);
+            *part += along;
+            next.iter_mut().zip(vector).for_each(|(value, v)| *value -= along * v);
+        }
+    }
+}
+
+/// The inner product, in four sums so that they run side by side.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    let mut sums = [0.0; 4];
+    for (a, b) in a.iter().zip(b) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    let rest = a_rest.iter().zip(b_rest).fold(0.0, |sum, (a, b)| sum + a * b);
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
+/// The Euclidean norm; the vectors here are scaled, so squares do not overflow.
+fn norm(x: &[f64]) -> f64 {
+    dot(x, x).sqrt()
+}
+
+/// The power of two that brings a positive number into [1, 2), as far as normal numbers reach.
+pub(super) fn inverse_power(x: f64) -> f64 {
+    let exponent = ((x.to_bits() >> 52) as i64 - 1023).clamp(-1000, 1000);
+    f64::from_bits(((1023 - exponent) as u64) << 52)
+}
+
+/// |a|_2 / |b|_2 for vectors of any scale.
+pub(super) fn ratio(a: &[f64], b: &[f64]) -> f64 {
+    let largest = |x: &[f64]| x.iter().fold(f64::MIN_POSITIVE, |largest, x| largest.max(x.abs()));
+    let scale = inverse_power(largest(a).max(largest(b)));
+    let norm = |x: &[f64]| x.iter().fold(0.0, |sum, x| sum + (x * scale) * (x * scale)).sqrt();
+    norm(a) / norm(b)
+}

@@ -1,0 +1,148 @@
+//! Incomplete factors without fill-in.
+
+use super::csr::CsrMatrix;
+use crate::error::{Error, LinearError, Result};
+use crate::particles::reserved;
+
+/// The incomplete factors L U ~ A that are zero wherever A is: ILU(0), the preconditioner of [`Gmres`](crate::Gmres).
+///
+/// L has a unit diagonal; (L U)_pq = A_pq on the pattern of A, to which a diagonal place is added where it lacks one. On a
+/// tridiagonal matrix the factors are complete. Cost: for every entry left of the diagonal one sweep over two rows;
+/// memory as the matrix.
+///
+/// ```
+/// use parops::{CsrMatrix, Ilu0};
+/// let a = CsrMatrix::from_triplets(2, 2, [(0, 0, 2.0), (0, 1, 1.0), (1, 0, 4.0), (1, 1, 3.0)])?;
+/// let mut x = [3.0, 7.0];
+/// Ilu0::new(&a)?.solve(&mut x)?;
+/// assert_eq!(x, [1.0, 1.0]);
+/// # parops::Result::Ok(())
+/// ```
+///
+/// Source: J. A. Meijerink and H. A. van der Vorst, 1977.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ilu0 {
+    /// L below the diagonal, U on and above it.
+    factors: CsrMatrix<f64>,
+    /// The place of the diagonal entry of each row.
+    diagonal: Vec<usize>,
+}
+
+impl Ilu0 {
+    /// Factors a square matrix.
+    ///
+    /// # Errors
+    /// [`LinearError::NotSquare`]; [`LinearError::ZeroPivot`] naming the row whose pivot is not above n eps max_q |A_pq|
+    /// for its n entries, which is what rounding leaves of zero, or not finite.
+    pub fn new(matrix: &CsrMatrix<f64>) -> Result<Self> {
+        let n = square(matrix)?;
+        let mut factors = with_diagonal(matrix)?;
+        let mut diagonal = reserved(n)?;
+        // place[q] is where column q stands in the row at work.
+        let mut place = vec![usize::MAX; n];
+        for row in 0..n {
+            let range = factors.offsets[row]..factors.offsets[row + 1];
+            let mut largest = 0.0_f64;
+            for at in range.clone() {
+                place[factors.columns[at] as usize] = at;
+                largest = largest.max(factors.values[at].abs());
+            }
+            let mut own = range.start;
+            while (factors.columns[own] as usize) < row {
+                let upper = factors.columns[own] as usize;
+                let pivot = diagonal[upper];
+                let factor = factors.values[own] / factors.values[pivot];
+                factors.values[own] = factor;
+                for at in pivot + 1..factors.offsets[upper + 1] {
+                    let target = place[factors.columns[at] as usize];
+                    if target != usize::MAX {
+                        factors.values[target] -= factor * factors.values[at];
+                    }
+                }
+                own += 1;
+            }
+            let pivot = factors.values[own];
+            if !(pivot.is_finite() && pivot.abs() > range.len() as f64 * f64::EPSILON * largest) {
+                return Err(Error::from(LinearError::ZeroPivot { pivot, largest }).at(row));
+            }
+            diagonal.push(own);
+            factors.columns[range].iter().for_each(|&q| place[q as usize] = usize::MAX);
+        }
+        Ok(Self { factors, diagonal })
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.diagonal.len()
+    }
+
+    /// Overwrites x with the solution of L U y = x. Allocates nothing.
+    ///
+    /// # Errors
+    /// [`LinearError::Length`] for a vector of another length.
+    pub fn solve(&self, x: &mut [f64]) -> Result<()> {
+        check_length(x.len(), self.rows())?;
+        let Self { factors, diagonal } = self;
+        let sum = |from: usize, to: usize, x: &[f64]| -> f64 {
+            let entries = factors.columns[from..to].iter().zip(&factors.values[from..to]);
+            entries.fold(0.0, |sum, (&q, value)| sum + value * x[q as usize])
+        };
+        for (row, &own) in diagonal.iter().enumerate() {
+            x[row] -= sum(factors.offsets[row], own, x);
+        }
+        for (row, &own) in diagonal.iter().enumerate().rev() {
+            x[row] = (x[row] - sum(own + 1, factors.offsets[row + 1], x)) / factors.values[own];
+        }
+        Ok(())
+    }
+
+    /// Overwrites x with the solution of (L U)^T y = x. Allocates nothing.
+    ///
+    /// # Errors
+    /// [`LinearError::Length`] for a vector of another length.
+    pub fn solve_transposed(&self, x: &mut [f64]) -> Result<()> {
+        check_length(x.len(), self.rows())?;
+        let Self { factors, diagonal } = self;
+        let spread = |from: usize, to: usize, y: f64, x: &mut [f64]| {
+            for (&q, value) in factors.columns[from..to].iter().zip(&factors.values[from..to]) {
+                x[q as usize] -= value * y;
+            }
+        };
+        for (row, &own) in diagonal.iter().enumerate() {
+            x[row] /= factors.values[own];
+            spread(own + 1, factors.offsets[row + 1], x[row], x);
+        }
+        for (row, &own) in diagonal.iter().enumerate().rev() {
+            spread(factors.offsets[row], own, x[row], x);
+        }
+        Ok(())
+    }
+}
+
+/// The number of rows of a square matrix.
+pub(super) fn square(matrix: &CsrMatrix<f64>) -> Result<usize> {
+    let (rows, columns) = (matrix.rows(), matrix.columns());
+    if rows == columns { Ok(rows) } else { Err(LinearError::NotSquare { rows, columns }.into()) }
+}
+
+/// Refuses a vector of another length than the matrix has rows.
+pub(super) fn check_length(found: usize, needed: usize) -> Result<()> {
+    if found == needed { Ok(()) } else { Err(LinearError::Length { found, needed }.into()) }
+}
+
+/// The matrix with a zero on the diagonal of every row that has no entry there.
+fn with_diagonal(matrix: &CsrMatrix<f64>) -> Result<CsrMatrix<f64>> {
+    let n = matrix.rows();
+    let lacks = |row: usize| matrix.range(row).0.binary_search(&(row as u32)).is_err();
+    let lacking = (0..n).filter(|&row| lacks(row)).count();
+    let mut full = CsrMatrix::empty(n, n, matrix.entries() + lacking)?;
+    for row in 0..n {
+        let (columns, values) = matrix.range(row);
+        let before = columns.partition_point(|&q| (q as usize) < row);
+        let entry = |(&q, &value)| (q, value);
+        let own = lacks(row).then_some((row as u32, 0.0));
+        let left = columns[..before].iter().zip(&values[..before]).map(entry);
+        full.push_row(left.chain(own).chain(columns[before..].iter().zip(&values[before..]).map(entry)))?;
+    }
+    Ok(full)
+}
