@@ -44,10 +44,15 @@ pub struct MomentScratch<T> {
     pub(super) a: Vec<T>,
     pub(super) b: Vec<T>,
     pub(super) y: Vec<T>,
+    pub(super) kept: Vec<T>,
 }
 
 /// Finds the weights of a filled [`MomentSystem`].
 pub trait MomentSolver: Clone + Send + Sync + 'static {
+    /// Whether operators try Cholesky on many stencils side by side first, and this method where that gives rows that
+    /// are not sharp.
+    const AFTER_CHOLESKY: bool = false;
+
     /// Writes the weights of output k into `w[k n..(k + 1) n]` and says how good they are.
     ///
     /// # Errors
@@ -59,6 +64,21 @@ pub trait MomentSolver: Clone + Send + Sync + 'static {
         scratch: &mut MomentScratch<T>,
         w: &mut [T],
     ) -> Result<Solution<T>>;
+
+    /// As [`solve`](Self::solve), where Cholesky has left the solution `known`, or none, with its weights in `w`.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    fn climb<T: Scalar, const D: usize>(
+        &self,
+        known: Option<Solution<T>>,
+        system: &MomentSystem<T, D>,
+        scratch: &mut MomentScratch<T>,
+        w: &mut [T],
+    ) -> Result<Solution<T>> {
+        let _ = known;
+        self.solve(system, scratch, w)
+    }
 }
 
 /// max over the outputs of their residuals, NaN being the largest.
@@ -71,16 +91,20 @@ impl<T: Scalar> Solution<T> {
     /// Whether the residual is rounding and nothing else: at most 4 l eps cond(B) max|b|, at most
     /// 30 l eps max_alpha sum_q |w_q z_q^alpha|, and at most sqrt(eps) max|b|, because where condition or weights reach
     /// 1/eps the first two say nothing. NaN is not.
+    ///
+    /// The estimate is of B with its columns scaled. Before that, cond(B) is at least
+    /// max_alpha sum_q |w_q z_q^alpha| / |b| by Cauchy and Schwarz, with |b| <= sqrt(l) max|b|: the larger one on slivers.
     pub fn holds<const D: usize>(&self, system: &MomentSystem<T, D>) -> bool {
         self.is_within(system.conditions(), system.largest_required())
     }
 
     /// As [`holds`](Self::holds), for l conditions and max|b|.
-    fn is_within(&self, conditions: usize, largest: T) -> bool {
+    pub(crate) fn is_within(&self, conditions: usize, largest: T) -> bool {
         let eps = T::default_epsilon();
         let unit = eps * T::lift(conditions as f64);
         let Residual { absolute, terms } = self.residual;
-        absolute <= T::lift(4.0) * unit * self.condition * largest
+        let unscaled = terms / T::lift(conditions as f64).sqrt();
+        absolute <= T::lift(4.0) * unit * (self.condition * largest).max(unscaled)
             && absolute <= T::lift(30.0) * unit * terms
             && absolute <= eps.sqrt() * largest
     }
