@@ -7,10 +7,11 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::time::Duration;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::measurement::WallTime;
+use criterion::{BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use parops::{
     Allowance, Apply, CellList, Cutoff, Domain, Epsilon, Exchange, Laplacian, NeighborList, Particles, Pse, Random,
-    Rows,
+    Rows, Strided,
 };
 
 /// In spacings: a ball of this radius holds 4/3 pi 1.94^3 = 30.6 particles.
@@ -73,6 +74,7 @@ fn apply(c: &mut Criterion) {
             println!("{:.1} neighbors a particle", rows.report().pairs as f64 / n as f64);
             group.bench_function(id("stored f64"), |b| b.iter(|| rows.apply(black_box(&f), &mut out)));
             accuracy("stored f64", &particles, out.iter().copied(), defect);
+            several_fields(&mut group, &rows, order);
             drop(rows);
             let rows = Rows::<_, f32>::assemble(&pse, &cells).expect("allowed");
             group.bench_function(id("stored f32"), |b| b.iter(|| rows.apply(black_box(&f32s), &mut short)));
@@ -88,6 +90,24 @@ fn apply(c: &mut Criterion) {
         }
     }
     group.finish();
+}
+
+/// Time for F fields at once; over F it is the time per particle and field.
+fn several_fields(group: &mut BenchmarkGroup<'_, WallTime>, rows: &Rows, order: &str) {
+    const F: usize = 16;
+    let n = rows.targets();
+    let id = |name: &str| BenchmarkId::new(format!("{name}, {order}"), n);
+    let value = |i: usize| (i as f64 * 0.37).sin();
+    let fields: Vec<[f64; F]> = (0..n).map(|p| std::array::from_fn(|i| value(p * F + i))).collect();
+    let mut out = vec![[0.0; F]; n];
+    group.bench_function(id("16 fields, interleaved"), |b| b.iter(|| rows.apply_fields(black_box(&fields), &mut out)));
+    let stacked = fields.as_flattened();
+    group.bench_function(id("16 fields, stacked"), |b| {
+        b.iter(|| {
+            let f = Strided::stacked(black_box(stacked), F).expect("16 fields");
+            rows.apply_strided(f, Strided::stacked(out.as_flattened_mut(), F).expect("16 fields"))
+        })
+    });
 }
 
 criterion_group!(benches, apply);

@@ -4,8 +4,8 @@ use std::env;
 use std::fmt::{Debug, Display};
 
 use parops::{
-    Along, Beta, D1, D2, D3, Divergence, ErrorKind, Expression, Gradient, Homogeneous, Laplacian, MultiIndex,
-    MultiIndexError, Operator, Outputs, Plus, Times,
+    Along, AlongTwice, Beta, BiLaplacian, D1, D2, D3, Divergence, ErrorKind, Expression, Gradient, Hessian,
+    Homogeneous, Laplacian, MultiIndex, MultiIndexError, Operator, Outputs, Plus, Times,
 };
 use proptest::prelude::*;
 use typenum::{U0, U1, U2, Unsigned, tarr};
@@ -60,6 +60,20 @@ fn named_operators_have_the_terms_of_their_formula() {
     same(Laplacian::<1>, &[([2], 1.0)]);
     same(Laplacian::<3>, &[([2, 0, 0], 1.0), ([0, 2, 0], 1.0), ([0, 0, 2], 1.0)]);
     same(Along([0.5, -2.0]), &[([1, 0], 0.5), ([0, 1], -2.0)]);
+    same(AlongTwice([0.5, -2.0]), &[([2, 0], 0.25), ([1, 1], -2.0), ([0, 2], 4.0)]);
+    same(BiLaplacian::<1>, &[([4], 1.0)]);
+    let pairs = [([2, 2, 0], 2.0), ([2, 0, 2], 2.0), ([0, 4, 0], 1.0), ([0, 2, 2], 2.0), ([0, 0, 4], 1.0)];
+    same(BiLaplacian::<3>, &[&[([4, 0, 0], 1.0)], &pairs[..]].concat());
+    same(
+        Laplacian::<2> + AlongTwice([1.0, 2.0]),
+        &[([2, 0], 1.0), ([0, 2], 1.0), ([2, 0], 1.0), ([1, 1], 4.0), ([0, 2], 4.0)],
+    );
+    let hessian = [(0, [2, 0], 1.0_f64), (1, [1, 1], 1.0), (2, [0, 2], 1.0)];
+    assert_eq!(bits(&Hessian::<2>), hessian.map(|(output, index, factor)| (output, index, factor.to_bits())));
+    assert_eq!(
+        (2.0 * Hessian::<3>).to_string(),
+        "2 (D^(2,0,0), D^(1,1,0), D^(1,0,1), D^(0,2,0), D^(0,1,1), D^(0,0,2))"
+    );
     let gradient = [(0, [1, 0, 0], 1.0_f64), (1, [0, 1, 0], 1.0), (2, [0, 0, 1], 1.0)];
     assert_eq!(bits(&Gradient::<3>), gradient.map(|(output, index, factor)| (output, index, factor.to_bits())));
     assert_eq!(bits(&Divergence::<3>::default()), bits(&Gradient::<3>));

@@ -9,7 +9,7 @@ use parops::{
     Sph, Stencil, Stepper,
 };
 #[cfg(not(feature = "rayon"))]
-use parops::{Apply, NeighborList, Rows};
+use parops::{Apply, NeighborList, Rows, Strided};
 
 struct Counting;
 
@@ -149,6 +149,16 @@ fn applying_stored_rows_allocates_nothing_and_matrix_free_nothing_after_the_firs
     assert_eq!(allocations(|| gradient.apply_all(&f, &mut outs).unwrap()), 0);
     assert_eq!(allocations(|| gradient.apply_dot(&outs, &mut out).unwrap()), 0);
     assert_eq!(allocations(|| gradient.apply_along(&outs, &f, &mut out).unwrap()), 0);
+    assert_eq!(allocations(|| gradient.apply_curl(&outs, &mut out).unwrap()), 0);
+    let mut jacobian = vec![[[0.0; 2]; 2]; n];
+    assert_eq!(allocations(|| gradient.apply_jacobian(&outs, &mut jacobian).unwrap()), 0);
+    let (fields, mut results) = (vec![[1.0; 5]; n], vec![[0.0; 5]; n]);
+    assert_eq!(allocations(|| rows.apply_fields(&fields, &mut results).unwrap()), 0);
+    let mut strided = || {
+        let f = Strided::interleaved(fields.as_flattened(), 5).unwrap();
+        rows.apply_strided(f, Strided::stacked(results.as_flattened_mut(), 5).unwrap()).unwrap();
+    };
+    assert_eq!(allocations(&mut strided), 0);
 
     let (cells, listed) = (pse.matrix_free(&neighbors).unwrap(), pse.matrix_free(&list).unwrap());
     let free: [&dyn Apply<f64>; 2] = [&cells, &listed];

@@ -2,7 +2,7 @@
 
 use parops::{
     Allowance, Apply, CellList, Domain, Epsilon, Error, Exchange, Face, Gradient, Laplacian, Method, PairScratch,
-    Particles, Pse, Random, Report, Result, RowReport, Rows, Sign, Stencil,
+    Particles, Pse, Random, Report, Result, RowReport, Rows, Sign, Stencil, Strided,
 };
 
 /// More rows than three blocks of work hold, with all kinds of faces.
@@ -51,6 +51,13 @@ fn work(particles: &Particles<2>, domain: &Domain<2>) -> Bits {
     applied.push(bits(&out));
     gradient.apply_along(&outs, &f, &mut out).unwrap();
     applied.push(bits(&out));
+    gradient.apply_curl(&outs, &mut out).unwrap();
+    applied.push(bits(&out));
+    let (stacked, mut results) = ([&f[..], &out].concat(), vec![0.0; 2 * n]);
+    for layout in [Strided::stacked, Strided::interleaved] {
+        rows.apply_strided(Strided::stacked(&stacked[..], 2).unwrap(), layout(&mut results[..], 2).unwrap()).unwrap();
+        applied.push(bits(&results));
+    }
     single.apply(&f32s, &mut short).unwrap();
     applied.push(short.iter().map(|x| u64::from(x.to_bits())).collect());
     free.apply(&f32s, &mut short).unwrap();

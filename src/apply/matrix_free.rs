@@ -17,7 +17,7 @@ use crate::operator::Method;
 /// the feature `rayon` does.
 pub struct MatrixFree<'a, const D: usize, M: Method<D>, P> {
     method: &'a M,
-    neighbors: &'a P,
+    pub(super) neighbors: &'a P,
     report: Report,
     workers: Mutex<Vec<Worker<D, M>>>,
 }
@@ -66,7 +66,11 @@ impl<'a, const D: usize, M: Method<D>, P: Neighbors<D>> MatrixFree<'a, D, M, P> 
 
 impl<const D: usize, const K: usize, M: Method<D, Out = [f64; K]>, P: Neighbors<D>> MatrixFree<'_, D, M, P> {
     /// Fills row after row and hands each to `row`, which gives its result.
-    fn each<T: Send>(&self, out: &mut [T], row: impl Fn(usize, &Worker<D, M>) -> T + Sync + Send) -> Result<()> {
+    pub(super) fn each<T: Send>(
+        &self,
+        out: &mut [T],
+        row: impl Fn(usize, &Worker<D, M>) -> T + Sync + Send,
+    ) -> Result<()> {
         each_part(out, |first, out| {
             self.with_worker(|worker| {
                 for (p, out) in (first..).zip(out) {

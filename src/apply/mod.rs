@@ -2,14 +2,20 @@
 
 mod assemble;
 pub(crate) mod blocks;
+mod composed;
+mod fields;
 mod matrix_free;
 mod report;
 mod rows;
+mod strided;
 mod sweep;
+mod vector;
 
 pub use matrix_free::MatrixFree;
 pub use report::Report;
 pub use rows::{Row, Rows};
+pub use strided::Strided;
+pub use vector::Vector;
 
 use num_traits::AsPrimitive;
 

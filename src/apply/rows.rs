@@ -104,7 +104,7 @@ impl<S: Outputs, T: Field> Rows<S, T> {
 }
 
 /// A stored row, ready to be summed.
-struct Stored<'a, T, const K: usize> {
+pub(super) struct Stored<'a, T, const K: usize> {
     sources: &'a [u32],
     weights: &'a [[T; K]],
     diagonal: Option<[T; K]>,
@@ -130,7 +130,7 @@ impl<T: Field, const K: usize> Sweep<T, K> for Stored<'_, T, K> {
 
 impl<const K: usize, T: Field> Rows<[f64; K], T> {
     #[inline(always)]
-    fn stored(&self, p: usize) -> Stored<'_, T, K> {
+    pub(super) fn stored(&self, p: usize) -> Stored<'_, T, K> {
         let range = self.offsets[p]..self.offsets[p + 1];
         Stored {
             sources: &self.columns[range.clone()],

@@ -13,55 +13,57 @@ pub(super) trait Sweep<T: Field, const K: usize> {
     /// Sources and their weights in the order of summation.
     fn pairs(&self) -> impl Iterator<Item = (usize, [T; K])>;
 
+    /// The sum over the row of what `add` makes of the weights and of a field of C components: d and f_p first, then
+    /// w_q and f_q - f_p, pair by pair.
+    #[inline(always)]
+    fn sum<const C: usize, S>(
+        &self,
+        zero: S,
+        value: impl Fn(usize) -> [T; C],
+        add: impl Fn(&mut S, &[T; K], &[T; C]),
+    ) -> S {
+        let mut sum = zero;
+        let Some(own) = self.center().map(&value) else {
+            self.pairs().for_each(|(q, w)| add(&mut sum, &w, &value(q)));
+            return sum;
+        };
+        if let Some(d) = self.diagonal() {
+            add(&mut sum, &d, &own);
+        }
+        for (q, w) in self.pairs() {
+            let mut difference = value(q);
+            difference.iter_mut().zip(&own).for_each(|(f, own)| *f -= *own);
+            add(&mut sum, &w, &difference);
+        }
+        sum
+    }
+
     /// All outputs of a scalar field.
     #[inline(always)]
     fn all(&self, f: &[T]) -> [T; K] {
-        let own = self.center().map(|center| f[center]);
-        let mut sum = [T::zero(); K];
-        if let (Some(d), Some(fp)) = (self.diagonal(), own) {
-            for (sum, d) in sum.iter_mut().zip(d) {
-                *sum += d * fp;
-            }
-        }
-        for (q, w) in self.pairs() {
-            let value = own.map_or(f[q], |fp| f[q] - fp);
-            for (sum, w) in sum.iter_mut().zip(w) {
-                *sum += w * value;
-            }
-        }
-        sum
+        self.sum([T::zero(); K], |q| [f[q]], |sum, w, f| sum.iter_mut().zip(w).for_each(|(sum, w)| *sum += *w * f[0]))
     }
 
     /// The contraction with a vector field.
     #[inline(always)]
     fn dot(&self, f: &[[T; K]]) -> T {
-        let own = self.center().map(|center| f[center]);
-        let mut sum = T::zero();
-        if let (Some(d), Some(fp)) = (self.diagonal(), own) {
-            for k in 0..K {
-                sum += d[k] * fp[k];
-            }
-        }
-        for (q, w) in self.pairs() {
-            for k in 0..K {
-                sum += w[k] * own.map_or(f[q][k], |fp| f[q][k] - fp[k]);
-            }
-        }
-        sum
+        self.sum(T::zero(), |q| f[q], |sum, w, f| w.iter().zip(f).for_each(|(w, f)| *sum += *w * *f))
     }
 
     /// The derivative of a scalar field along v.
     #[inline(always)]
     fn along(&self, v: &[T; K], f: &[T]) -> T {
-        let along = |w: [T; K]| w.iter().zip(v).fold(T::zero(), |sum, (&w, &v)| sum + v * w);
-        let own = self.center().map(|center| f[center]);
-        let mut sum = T::zero();
-        if let (Some(d), Some(fp)) = (self.diagonal(), own) {
-            sum += along(d) * fp;
-        }
-        for (q, w) in self.pairs() {
-            sum += along(w) * own.map_or(f[q], |fp| f[q] - fp);
-        }
-        sum
+        let along = |w: &[T; K]| w.iter().zip(v).fold(T::zero(), |sum, (&w, &v)| sum + v * w);
+        self.sum(T::zero(), |q| [f[q]], |sum, w, f| *sum += along(w) * f[0])
+    }
+
+    /// All outputs of F fields, each as it would be alone.
+    #[inline(always)]
+    fn fields<const F: usize>(&self, value: impl Fn(usize) -> [T; F]) -> [[T; K]; F] {
+        self.sum([[T::zero(); K]; F], value, |sum, w, f| {
+            for (sum, f) in sum.iter_mut().zip(f) {
+                sum.iter_mut().zip(w).for_each(|(sum, w)| *sum += *w * *f);
+            }
+        })
     }
 }

@@ -24,6 +24,31 @@ kinds! {
             /// The value.
             value: f64,
         } => "the field is {value} here",
+        /// A value that is not finite, of one of several fields.
+        FieldOf {
+            /// Which field.
+            field: usize,
+            /// The value.
+            value: f64,
+        } => "field {field} is {value} here",
+        /// As many results as fields were asked for, and the output holds another number.
+        Fields {
+            /// Fields of the output.
+            found: usize,
+            /// Fields of the input.
+            needed: usize,
+        } => "the output has {found} fields, the input {needed}",
+        /// Strides with which values share a place or lie beyond the slice.
+        Strides {
+            /// Number of particles.
+            particles: usize,
+            /// Number of fields.
+            fields: usize,
+            /// From particle to particle and from field to field.
+            strides: [usize; 2],
+            /// Length of the slice.
+            places: usize,
+        } => "{fields} fields of {particles} particles do not fit {places} places with strides {strides:?}",
         /// Rows that belong to another generation of the particles.
         Stale {
             /// Generation the rows were made from.
@@ -36,5 +61,12 @@ kinds! {
             /// The result.
             value: f64,
         } => "the result is {value} here: it overflows",
+        /// A result that is not finite, of one of several fields.
+        OverflowOf {
+            /// Which field.
+            field: usize,
+            /// The result.
+            value: f64,
+        } => "the result of field {field} is {value} here: it overflows",
     }
 }

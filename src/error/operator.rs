@@ -24,6 +24,13 @@ kinds! {
             /// Number of neighbors of the target.
             neighbors: usize,
         } => "the target is no particle (it has {neighbors} neighbors), so the difference f_q - f_p does not exist",
+        /// Weights that are not of the form f_q - f_p, where an operator needs them to be.
+        NotDifference {
+            /// The factor of f_p on the diagonal.
+            found: f64,
+            /// What odd images leave there.
+            expected: f64,
+        } => "the diagonal is {found} where differences f_q - f_p leave {expected}",
         /// Per-particle data for another number of particles.
         Length {
             /// Entries held.

@@ -36,6 +36,18 @@ kinds! {
             /// The spacing.
             spacing: f64,
         } => "spacing {spacing} is not positive and finite",
+        /// A diffusivity that is negative or not finite.
+        Diffusivity {
+            /// The diffusivity.
+            diffusivity: f64,
+        } => "diffusivity {diffusivity} is negative or not finite",
+        /// A coefficient that is not finite.
+        Coefficient {
+            /// The output it multiplies.
+            output: usize,
+            /// The coefficient.
+            coefficient: f64,
+        } => "the coefficient of output {output} is {coefficient}",
         /// Two arrays that belong together have different lengths.
         Length {
             /// Length found.

@@ -1,0 +1,133 @@
+//! Operators whose coefficients are given per particle: v . grad, A : Hessian, a scalar times an operator.
+
+use std::sync::Arc;
+
+use super::method::{Method, RowReport};
+use crate::error::{Error, OperatorError, ParticleError, Result};
+use crate::stencil::Stencil;
+
+/// A method with K outputs contracted with K coefficients per target, (Q f)_p = sum_k c_k(p) (L_k f)_p: one stored
+/// weight per pair, sum_k c_k(p) w_pq,k.
+///
+/// v . grad for [`Gradient`](super::Gradient) and a velocity; A : Hessian for [`Hessian`](super::Hessian) and
+/// [`Hessian::packed`](super::Hessian::packed); c Lap for a scalar, K = 1. Exactness, order and signs are those of the
+/// method, whose rows are computed and certified as they stand. Where the coefficients are constant, [`Along`](super::Along),
+/// [`AlongTwice`](super::AlongTwice) and [`Times`](super::Times) give the same for fewer solves.
+///
+/// ```
+/// use parops::{Apply, CellList, Contraction, DcPse, Domain, Gradient, Particles};
+/// let scattered = Particles::jittered([0.0; 2], [1.0; 2], [12; 2], 0.3, 1)?;
+/// let gradient = DcPse::<Gradient<2>, 2>::new();
+/// let neighbors = CellList::build(&scattered, &Domain::open(), gradient.cutoff(&scattered)?)?;
+/// let turning: Vec<_> = scattered.points().iter().map(|x| [-x[1], x[0]]).collect();
+/// let rows = Contraction::new(gradient, turning)?.assemble(&neighbors)?;
+/// let f: Vec<_> = scattered.points().iter().map(|x| x[0] * x[0] + 2.0 * x[1]).collect();
+/// let mut out = vec![0.0; f.len()];
+/// rows.apply(&f, &mut out)?;
+/// // (-y, x) . (2 x, 2)
+/// assert!(scattered.points().iter().zip(&out).all(|(x, out)| (out - 2.0 * x[0] * (1.0 - x[1])).abs() < 1e-9));
+/// # parops::Result::Ok(())
+/// ```
+///
+/// See also: [`DivGrad`](super::DivGrad), where the coefficient stands inside the derivative; `apply_along` of gradient
+/// rows, for velocities that change from application to application.
+#[derive(Clone, Debug)]
+pub struct Contraction<M, const K: usize> {
+    method: M,
+    coefficients: Arc<[[f64; K]]>,
+}
+
+impl<M, const K: usize> Contraction<M, K> {
+    /// The contraction with these coefficients, K per target.
+    ///
+    /// # Errors
+    /// [`ParticleError::Coefficient`] naming the first particle and output whose coefficient is not finite.
+    pub fn new(method: M, coefficients: impl Into<Arc<[[f64; K]]>>) -> Result<Self> {
+        let coefficients = coefficients.into();
+        for (p, values) in coefficients.iter().enumerate() {
+            if let Some((output, &coefficient)) = values.iter().enumerate().find(|(_, c)| !c.is_finite()) {
+                return Err(Error::from(ParticleError::Coefficient { output, coefficient }).at(p));
+            }
+        }
+        Ok(Self { method, coefficients })
+    }
+
+    /// The method that is contracted.
+    pub fn method(&self) -> &M {
+        &self.method
+    }
+
+    fn coefficients_of(&self, p: usize) -> Result<&[f64; K]> {
+        let found = self.coefficients.len();
+        self.coefficients.get(p).ok_or_else(|| OperatorError::Length { found, index: p }.into())
+    }
+}
+
+/// Working memory of [`Contraction`]: that of the method, and the row it makes.
+#[derive(Clone, Debug)]
+pub struct ContractionScratch<S, const K: usize> {
+    method: S,
+    w: Vec<[f64; K]>,
+    diagonal: [f64; K],
+}
+
+impl<M, const D: usize, const K: usize> Method<D> for Contraction<M, K>
+where
+    M: Method<D, Out = [f64; K]>,
+{
+    type Out = [f64; 1];
+    type Scratch = ContractionScratch<M::Scratch, K>;
+
+    fn scratch(&self) -> Result<Self::Scratch> {
+        Ok(ContractionScratch { method: self.method.scratch()?, w: Vec::new(), diagonal: [0.0; K] })
+    }
+
+    fn validate(&self, targets: usize, sources: usize) -> Result<()> {
+        let found = self.coefficients.len();
+        if found != targets {
+            return Err(ParticleError::Length { found, needed: targets }.into());
+        }
+        self.method.validate(targets, sources)
+    }
+
+    fn cutoff(&self, p: usize) -> Result<Option<f64>> {
+        self.method.cutoff(p)
+    }
+
+    fn weights(
+        &self,
+        row: &Stencil<D>,
+        scratch: &mut Self::Scratch,
+        w: &mut [[f64; 1]],
+        diagonal: &mut [f64; 1],
+    ) -> Result<()> {
+        let coefficients = self.coefficients_of(row.target())?;
+        scratch.w.clear();
+        scratch.w.resize(row.len(), [0.0; K]);
+        self.method.weights(row, &mut scratch.method, &mut scratch.w, &mut scratch.diagonal)?;
+        for (w, outputs) in w.iter_mut().zip(&scratch.w) {
+            w[0] = contract(coefficients, outputs);
+        }
+        diagonal[0] = contract(coefficients, &scratch.diagonal);
+        Ok(())
+    }
+
+    fn report(
+        &self,
+        row: &Stencil<D>,
+        scratch: &Self::Scratch,
+        w: &[[f64; 1]],
+        diagonal: &[f64; 1],
+    ) -> Result<RowReport> {
+        let mut report = self.method.report(row, &scratch.method, &scratch.w, &scratch.diagonal)?;
+        let general = RowReport::of(row, w, diagonal);
+        (report.sum_abs, report.spectral_bound) = (general.sum_abs, general.spectral_bound);
+        report.negative_weights = w.iter().zip(row.signs()).filter(|&(w, &sign)| w[0] * f64::from(sign) < 0.0).count();
+        Ok(report)
+    }
+}
+
+#[inline(always)]
+fn contract<const K: usize>(coefficients: &[f64; K], outputs: &[f64; K]) -> f64 {
+    coefficients.iter().zip(outputs).map(|(c, w)| c * w).sum()
+}
