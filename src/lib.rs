@@ -46,7 +46,7 @@ mod scale;
 mod stencil;
 mod time;
 
-pub use apply::{Apply, Field, MatrixFree, Report, Row, Rows, Strided, Vector};
+pub use apply::{Apply, Field, Histogram, MatrixFree, Report, Row, Rows, Strided, Vector};
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
 pub use error::*;
 pub use kernel::{
@@ -60,7 +60,7 @@ pub use moment::{
 };
 pub use multi_index::*;
 pub use neighbors::{
-    BruteForce, Canonical, CellList, NeighborList, Neighbors, epsilon_from_neighbors, mean_neighbor_distance,
+    BruteForce, Canonical, CellList, Nearest, NeighborList, Neighbors, epsilon_from_neighbors, mean_neighbor_distance,
     volumes_from_neighbors,
 };
 pub use operator::*;

@@ -378,7 +378,7 @@ fn weights_of_a_foreign_method_that_are_no_numbers_are_refused_and_unknown_defec
     }
     let rows = Rows::<[f64; 1]>::assemble(&Careless(1.0), &neighbors)?;
     assert!(rows.report().moment_defect.is_nan(), "a defect nobody knows is not the best of all");
-    assert_eq!(rows.report().worst.map(|worst| worst.target), Some(0));
+    assert_eq!(rows.report().worst().map(|worst| worst.target), Some(0));
     assert_eq!(rows.targets(), particles.len());
     Ok(())
 }

@@ -33,7 +33,7 @@ fn measure<M: Method<2, Out = [f64; 1]>>(
         Err(error) => {
             let moment = OperatorError::Moment { defect, limit: parops::MOMENT_TOLERANCE };
             assert_eq!(*error.kind(), ErrorKind::Operator(moment));
-            assert_eq!(error.particle(), rows.report().worst.map(|worst| worst.target));
+            assert_eq!(error.particle(), rows.report().worst().map(|worst| worst.target));
         }
     }
     let f: Vec<f64> = particles.points().iter().map(wave).collect();

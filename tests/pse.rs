@@ -132,7 +132,7 @@ fn scattered_set_is_refused_at_the_worst_particle_unless_allowed() -> Failure {
     let worst = error.particle().unwrap();
 
     let allowed = pse.clone().allow(Allowance::Everywhere).assemble(&neighbors)?;
-    let report = allowed.report().worst.unwrap();
+    let report = allowed.report().worst().unwrap();
     assert_eq!((report.target, report.moment_defect), (worst, defect));
     assert_eq!(allowed.report().moment_defect, defect);
     assert!(allowed.report().allowed > 0 && report.allowed);
@@ -479,7 +479,7 @@ fn empty_set_has_no_rows() -> Failure {
     let rows = pse.assemble(&CellList::build(&particles, &unit_torus(), pse.cutoff())?)?;
     let mut out: Vec<f64> = Vec::new();
     rows.apply(&[], &mut out)?;
-    assert_eq!((rows.report().rows, rows.report().worst), (0, None));
+    assert_eq!((rows.report().rows, rows.report().worst()), (0, None));
     Ok(())
 }
 

@@ -1,11 +1,9 @@
 //! Sets on which moment conditions lose their rank: what the library refuses, and that what it accepts holds.
 
 use parops::{
-    DcPse, ErrorKind, Gradient, Laplacian, Method, Neighbors, Operator, OperatorError, Particles, Random, RowReport,
-    Stencil,
+    DcPse, Domain, ErrorKind, Gradient, Laplacian, Method, Nearest, Neighbors, Operator, OperatorError, Particles,
+    Random, RowReport, Stencil,
 };
-
-use crate::nearest::Nearest;
 
 /// What became of the rows of one set.
 pub struct Line {
@@ -68,7 +66,7 @@ where
 {
     let particles = Particles::new(points)?;
     let dcpse = DcPse::<Op, 2>::of(operator).neighbors_per_condition(neighbors_per_condition)?;
-    let neighbors = Nearest::build(&particles, dcpse.fewest_neighbors()?, 0.1)?;
+    let neighbors = Nearest::build(&particles, &Domain::open(), dcpse.fewest_neighbors()?)?;
     let mut line = Line {
         dim: D,
         operator: operator_name,

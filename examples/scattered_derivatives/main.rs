@@ -20,7 +20,6 @@ mod field;
 #[path = "../figure/mod.rs"]
 mod figure;
 mod figures;
-mod nearest;
 #[path = "../options/mod.rs"]
 mod options;
 mod sets;

@@ -3,10 +3,9 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use parops::{DcPse, MultiIndex, Neighbors, Operator, Particles, Report};
+use parops::{DcPse, Domain, MultiIndex, Nearest, Neighbors, Operator, Particles, Report};
 
 use crate::field::{derivative, exact};
-use crate::nearest::Nearest;
 use crate::sets::Set;
 
 /// One line of the table.
@@ -60,9 +59,7 @@ where
     let count = points.len();
     let dcpse = DcPse::at_order(operator.clone(), order)?;
     let needed = dcpse.fewest_neighbors()?;
-    let h = (count as f64).powf(-1.0 / D as f64);
-    let first = 0.5 * h * (needed as f64).powf(1.0 / D as f64) / if set == Set::Clustered { 2.0 } else { 1.0 };
-    let neighbors = Nearest::build(particles, needed, first)?;
+    let neighbors = Nearest::build(particles, &Domain::open(), needed)?;
 
     let start = Instant::now();
     let mut rows = dcpse.assemble(&neighbors)?;
@@ -114,7 +111,7 @@ where
         order,
         particles: count,
         interior: interior.count,
-        conditions: report.worst.map_or(0, |row| row.conditions),
+        conditions: report.worst().map_or(0, |row| row.conditions),
         neighbors: report.pairs as f64 / count as f64,
         l2: interior.l2(),
         linf: interior.largest / interior.largest_exact,

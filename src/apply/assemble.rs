@@ -2,16 +2,17 @@
 
 use super::blocks::{BLOCK, each_block};
 use super::rows::{Centers, Rows};
+use super::splice::Stray;
+use super::worker::{BATCH, Worker, cutoff};
 use super::{Field, MatrixFree, Report};
 use crate::domain::Domain;
 use crate::error::{Error, NeighborError, OperatorError, Result};
 use crate::kernel::{Kernel, SmoothingKernel};
 use crate::moment::MomentSolver;
 use crate::neighbors::{CellList, Neighbors};
-use crate::operator::{DcPse, Method, Operator, Outputs, Pse, RowReport, Sph};
+use crate::operator::{DcPse, Draft, Method, Operator, Outputs, Pse, Sph, finite};
 use crate::particles::{Particles, reserved};
 use crate::scale::Cutoff;
-use crate::stencil::Stencil;
 
 impl<S: Outputs, T: Field> Rows<S, T> {
     /// Builds the rows of `method` over `neighbors`, with weights rounded to `T`.
@@ -42,51 +43,31 @@ impl<S: Outputs, T: Field> Rows<S, T> {
             weights: &mut weights,
             diagonal: &mut diagonal,
         };
-        let reports = each_block(blocks, |block| {
+        let made = each_block(blocks, |mut block| {
             let mut worker = Worker::new(method)?;
-            let mut report = Report::default();
-            for (i, diagonal) in block.diagonal.iter_mut().enumerate() {
-                let p = block.first + i;
-                worker.fill(method, neighbors, p)?;
-                let range = offsets[p] - offsets[block.first]..offsets[p + 1] - offsets[block.first];
-                let (found, needed) = (offsets[p] + worker.row.len(), offsets[p + 1]);
-                if found != needed {
-                    return Err(Error::from(NeighborError::Offsets { row: p, found, needed }).at(p));
+            let (mut report, mut strays) = (Report::default(), Vec::new());
+            let past = block.first + block.diagonal.len();
+            for first in (block.first..past).step_by(BATCH) {
+                for draft in worker.rows(method, neighbors, first..past.min(first + BATCH))? {
+                    strays.extend(block.store(&offsets, draft, &mut report)?);
                 }
-                block.columns[range.clone()].copy_from_slice(worker.row.sources());
-                report.add(&worker.report(method, p)?);
-                for (stored, w) in block.weights[range.clone()].iter_mut().zip(&worker.weights) {
-                    *stored = w.map(T::lift);
-                }
-                *diagonal = worker.diagonal.map(T::lift);
-                let weights = block.weights[range].iter().map(AsRef::as_ref);
-                finite(&worker.row, weights, diagonal.as_ref()).map_err(|error| error.at(p))?;
             }
-            Ok(report)
+            Ok((report, strays))
         })?;
-        let mut report = Report::default();
-        reports.iter().for_each(|block| report.merge(block));
+        let (mut report, mut strays) = (Report::default(), Vec::new());
+        for (block, found) in made {
+            report.merge(&block);
+            strays.extend(found);
+        }
         report.accept()?;
         if diagonal.iter().all(|d| *d == zero) {
             diagonal = Vec::new();
         }
         let (sources, generation) = (neighbors.sources(), neighbors.generation());
-        Ok(Self { offsets, columns, weights, diagonal, centers: centers(neighbors)?, sources, generation, report })
-    }
-}
-
-/// Refuses weights that are not finite: those of a method, or those that a shorter type cannot hold.
-fn finite<'a, const D: usize, T: Field>(
-    row: &Stencil<D>,
-    weights: impl Iterator<Item = &'a [T]>,
-    diagonal: &[T],
-) -> Result<()> {
-    let bad = |w: &[T]| -> Option<f64> { w.iter().find(|w| !w.is_finite()).map(|w| w.as_()) };
-    let pair = row.sources().iter().zip(weights).find_map(|(&q, w)| Some((q as usize, bad(w)?)));
-    let own = || Some((row.center().unwrap_or(row.target()), bad(diagonal)?));
-    match pair.or_else(own) {
-        Some((q, weight)) => Err(OperatorError::Weight { q, weight }.into()),
-        None => Ok(()),
+        let centers = centers(neighbors)?;
+        let mut rows = Self { offsets, columns, weights, diagonal, centers, sources, generation, report };
+        rows.splice(&strays)?;
+        Ok(rows)
     }
 }
 
@@ -95,13 +76,6 @@ fn filled<V: Copy>(count: usize, value: V) -> Result<Vec<V>> {
     let mut values = reserved(count)?;
     values.resize(count, value);
     Ok(values)
-}
-
-/// The cutoff of target p: the method's own, or the provider's.
-fn cutoff<const D: usize, M: Method<D>, P: Neighbors<D>>(method: &M, neighbors: &P, p: usize) -> Result<f64> {
-    let cutoff = method.cutoff(p).map_err(|error| error.at(p))?.unwrap_or_else(|| neighbors.cutoff(p));
-    let reach = neighbors.reach();
-    if cutoff <= reach { Ok(cutoff) } else { Err(Error::from(NeighborError::Reach { cutoff, reach }).at(p)) }
 }
 
 /// Where each row begins.
@@ -132,45 +106,6 @@ fn centers<const D: usize, P: Neighbors<D>>(neighbors: &P) -> Result<Centers> {
         Ok(Centers::Same)
     } else {
         Ok(Centers::Each(targets.map(|p| neighbors.center(p).map(|q| q as u32)).collect()))
-    }
-}
-
-/// The stencil, scratch and weights one thread works with.
-pub(super) struct Worker<const D: usize, M: Method<D>> {
-    pub(super) row: Stencil<D>,
-    scratch: M::Scratch,
-    pub(super) weights: Vec<M::Out>,
-    pub(super) diagonal: M::Out,
-}
-
-impl<const D: usize, M: Method<D>> Worker<D, M> {
-    pub(super) fn new(method: &M) -> Result<Self> {
-        let diagonal = M::Out::ZERO;
-        Ok(Self { row: Stencil::default(), scratch: method.scratch()?, weights: Vec::new(), diagonal })
-    }
-
-    /// Makes the weights of target p.
-    pub(super) fn fill<P: Neighbors<D>>(&mut self, method: &M, neighbors: &P, p: usize) -> Result<()> {
-        neighbors.gather(p, cutoff(method, neighbors, p)?, &mut self.row);
-        let sources = neighbors.sources();
-        let named = self.row.sources().iter().map(|&q| q as usize).chain(self.row.center());
-        if let Some(q) = named.max().filter(|&q| q >= sources) {
-            return Err(Error::from(NeighborError::Source { q, sources }).at(p));
-        }
-        self.weights.clear();
-        self.weights.resize(self.row.len(), M::Out::ZERO);
-        let filled = method.weights(&self.row, &mut self.scratch, &mut self.weights, &mut self.diagonal);
-        filled.map_err(|error| error.at(p))
-    }
-
-    /// What is known of the row just filled, once it is known to be finite.
-    pub(super) fn report(&self, method: &M, p: usize) -> Result<RowReport> {
-        let known = || {
-            let weights = self.weights.iter().map(Outputs::as_slice);
-            finite(&self.row, weights, self.diagonal.as_slice())?;
-            method.report(&self.row, &self.scratch, &self.weights, &self.diagonal)
-        };
-        known().map_err(|error: Error| error.at(p))
     }
 }
 
@@ -208,6 +143,43 @@ struct Block<'a, W> {
     columns: &'a mut [u32],
     weights: &'a mut [W],
     diagonal: &'a mut [W],
+}
+
+impl<W: Copy> Block<'_, W> {
+    /// Stores a row where its room is, or returns it where it was widened or left empty.
+    fn store<const D: usize, S: Outputs<Of<T> = W>, T: Field>(
+        &mut self,
+        offsets: &[usize],
+        draft: &Draft<D, S>,
+        report: &mut Report,
+    ) -> Result<Option<Stray<W>>>
+    where
+        W: AsRef<[T]>,
+    {
+        let (row, p) = (&draft.stencil, draft.stencil.target());
+        let known = draft.report.clone()?;
+        report.add(&known);
+        let room = offsets[p] - offsets[self.first]..offsets[p + 1] - offsets[self.first];
+        let weights = draft.weights.iter().map(|w| w.map(T::lift));
+        let diagonal = draft.diagonal.map(T::lift);
+        self.diagonal[p - self.first] = diagonal;
+        if row.len() != room.len() && (known.grown > 0 || known.empty) {
+            let stray = Stray { p, columns: row.sources().to_vec(), weights: weights.collect() };
+            finite(row, stray.weights.iter().map(AsRef::as_ref), diagonal.as_ref()).map_err(|error| error.at(p))?;
+            return Ok(Some(stray));
+        }
+        if row.len() != room.len() {
+            let (found, needed) = (offsets[p] + row.len(), offsets[p + 1]);
+            return Err(Error::from(NeighborError::Offsets { row: p, found, needed }).at(p));
+        }
+        self.columns[room.clone()].copy_from_slice(row.sources());
+        for (stored, w) in self.weights[room.clone()].iter_mut().zip(weights) {
+            *stored = w;
+        }
+        let stored = self.weights[room].iter().map(AsRef::as_ref);
+        finite(row, stored, diagonal.as_ref()).map_err(|error| error.at(p))?;
+        Ok(None)
+    }
 }
 
 impl<K, const N: usize> Pse<K, N> {

@@ -2,13 +2,13 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::assemble::Worker;
 use super::blocks::{BLOCK, each_block, each_part};
 use super::sweep::Sweep;
+use super::worker::{BATCH, Worker};
 use super::{Apply, Field, Report, check, check_results, scalars};
 use crate::error::Result;
 use crate::neighbors::Neighbors;
-use crate::operator::Method;
+use crate::operator::{Draft, Method};
 
 /// A method over a provider, applied without stored weights; the same bits as the stored rows.
 ///
@@ -35,9 +35,10 @@ impl<'a, const D: usize, M: Method<D>, P: Neighbors<D>> MatrixFree<'a, D, M, P> 
         let reports = each_block(blocks, |rows| {
             operator.with_worker(|worker| {
                 let mut report = Report::default();
-                for p in rows {
-                    worker.fill(method, neighbors, p)?;
-                    report.add(&worker.report(method, p)?);
+                for first in rows.clone().step_by(BATCH) {
+                    for draft in worker.rows(method, neighbors, first..rows.end.min(first + BATCH))? {
+                        report.add(&draft.report.clone()?);
+                    }
                 }
                 Ok(report)
             })
@@ -69,13 +70,12 @@ impl<const D: usize, const K: usize, M: Method<D, Out = [f64; K]>, P: Neighbors<
     pub(super) fn each<T: Send>(
         &self,
         out: &mut [T],
-        row: impl Fn(usize, &Worker<D, M>) -> T + Sync + Send,
+        row: impl Fn(usize, &Draft<D, [f64; K]>) -> T + Sync + Send,
     ) -> Result<()> {
         each_part(out, |first, out| {
             self.with_worker(|worker| {
                 for (p, out) in (first..).zip(out) {
-                    worker.fill(self.method, self.neighbors, p)?;
-                    *out = row(p, worker);
+                    *out = row(p, worker.row(self.method, self.neighbors, p)?);
                 }
                 Ok(())
             })
@@ -88,7 +88,7 @@ impl<const D: usize, const K: usize, M: Method<D, Out = [f64; K]>, P: Neighbors<
     /// As [`Apply::apply`].
     pub fn apply_all<T: Field>(&self, f: &[T], out: &mut [[T; K]]) -> Result<()> {
         check(scalars(f), self.neighbors.sources(), out, self.neighbors.targets())?;
-        self.each(out, |_, worker| worker.all(f))?;
+        self.each(out, |_, draft| draft.all(f))?;
         check_results(out)
     }
 
@@ -98,7 +98,7 @@ impl<const D: usize, const K: usize, M: Method<D, Out = [f64; K]>, P: Neighbors<
     /// As [`Apply::apply`].
     pub fn apply_dot<T: Field>(&self, f: &[[T; K]], out: &mut [T]) -> Result<()> {
         check(f, self.neighbors.sources(), out, self.neighbors.targets())?;
-        self.each(out, |_, worker| worker.dot(f))?;
+        self.each(out, |_, draft| draft.dot(f))?;
         check_results(scalars(out))
     }
 
@@ -109,7 +109,7 @@ impl<const D: usize, const K: usize, M: Method<D, Out = [f64; K]>, P: Neighbors<
     pub fn apply_along<T: Field>(&self, v: &[[T; K]], f: &[T], out: &mut [T]) -> Result<()> {
         check(scalars(f), self.neighbors.sources(), out, self.neighbors.targets())?;
         check(v, self.neighbors.targets(), out, self.neighbors.targets())?;
-        self.each(out, |p, worker| worker.along(&v[p], f))?;
+        self.each(out, |p, draft| draft.along(&v[p], f))?;
         check_results(scalars(out))
     }
 }
@@ -133,10 +133,10 @@ where
 }
 
 /// The row just filled, with weights rounded like stored ones.
-impl<T: Field, const D: usize, const K: usize, M: Method<D, Out = [f64; K]>> Sweep<T, K> for Worker<D, M> {
+impl<T: Field, const D: usize, const K: usize> Sweep<T, K> for Draft<D, [f64; K]> {
     #[inline(always)]
     fn center(&self) -> Option<usize> {
-        self.row.center()
+        self.stencil.center()
     }
 
     #[inline(always)]
@@ -146,6 +146,6 @@ impl<T: Field, const D: usize, const K: usize, M: Method<D, Out = [f64; K]>> Swe
 
     #[inline(always)]
     fn pairs(&self) -> impl Iterator<Item = (usize, [T; K])> {
-        self.row.sources().iter().zip(&self.weights).map(|(&q, w)| (q as usize, w.map(T::lift)))
+        self.stencil.sources().iter().zip(&self.weights).map(|(&q, w)| (q as usize, w.map(T::lift)))
     }
 }

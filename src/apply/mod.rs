@@ -1,16 +1,20 @@
 //! Operators applied to fields: stored rows, or weights made anew for every application.
 
 mod assemble;
-pub(crate) mod blocks;
 mod composed;
 mod fields;
+mod histogram;
+pub(crate) mod blocks;
 mod matrix_free;
 mod report;
 mod rows;
+mod splice;
 mod strided;
 mod sweep;
 mod vector;
+mod worker;
 
+pub use histogram::Histogram;
 pub use matrix_free::MatrixFree;
 pub use report::Report;
 pub use rows::{Row, Rows};

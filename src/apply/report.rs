@@ -1,9 +1,13 @@
 //! What is known about all rows of an operator together.
 
+use super::histogram::Histogram;
 use crate::error::Result;
 use crate::operator::RowReport;
 
-/// What a build found: the extremes over all rows and the worst row.
+/// Number of rows a [`Report`] names.
+const WORST: usize = 8;
+
+/// What a build found: the extremes over all rows, how they are spread, and the worst rows.
 ///
 /// Being in the rows themselves, it costs nothing to ask again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -38,25 +42,55 @@ pub struct Report {
     pub residual: f64,
     /// Rows per solver, in the order of [`Rung`](crate::Rung).
     pub rungs: [usize; 5],
-    /// The row that breaks its limits worst, or, where none does, the row with the largest moment defect, then condition.
-    pub worst: Option<RowReport>,
+    /// The lowest convergence order of a row, empty rows apart; `None` where no row states one.
+    pub order: Option<u32>,
+    /// Rows of a widened support.
+    pub grown: usize,
+    /// Rows of a lower order than asked for.
+    pub lowered: usize,
+    /// Rows left without weights.
+    pub empty: usize,
+    /// Rows per decade of the condition number.
+    pub conditions: Histogram,
+    /// Rows per decade of the residual.
+    pub residuals: Histogram,
+    /// Rows per decade of the sum of absolute weights.
+    pub sums: Histogram,
+    worst: [Option<RowReport>; WORST],
 }
 
 impl Report {
+    /// The rows that break their limits worst, the worst first; of rows that break none those with the largest moment
+    /// defect, then condition number. At most 8.
+    pub fn worst_rows(&self) -> impl Iterator<Item = &RowReport> {
+        self.worst.iter().flatten()
+    }
+
+    /// The first of [`worst_rows`](Self::worst_rows).
+    pub fn worst(&self) -> Option<&RowReport> {
+        self.worst_rows().next()
+    }
+
     pub(super) fn add(&mut self, row: &RowReport) {
         self.fewest = if self.rows == 0 { row.neighbors } else { self.fewest.min(row.neighbors) };
         self.most = self.most.max(row.neighbors);
         self.rows += 1;
         self.pairs += row.neighbors;
-        self.extremes(row.h_over_epsilon, row.moment_defect, row.sum_abs, row.spectral_bound);
-        self.lower_moment = worse(self.lower_moment, row.lower_moment);
+        self.extremes([row.h_over_epsilon, row.moment_defect, row.lower_moment, row.sum_abs, row.spectral_bound]);
         self.negative_weights += row.negative_weights;
         self.allowed += usize::from(row.allowed);
         self.condition = self.condition.max(row.condition);
         self.residual = self.residual.max(row.residual);
         if let Some(rung) = row.rung {
             self.rungs[rung as usize] += 1;
+            self.conditions.add(row.condition);
+            self.residuals.add(row.residual);
+            self.sums.add(row.sum_abs);
         }
+        self.order = lower(self.order, row.order);
+        self.grown += usize::from(row.grown > 0);
+        self.lowered += usize::from(row.lowered > 0);
+        self.empty += usize::from(row.empty);
         self.rank(row);
     }
 
@@ -69,8 +103,7 @@ impl Report {
         self.most = self.most.max(next.most);
         self.rows += next.rows;
         self.pairs += next.pairs;
-        self.extremes(next.h_over_epsilon, next.moment_defect, next.sum_abs, next.spectral_bound);
-        self.lower_moment = worse(self.lower_moment, next.lower_moment);
+        self.extremes([next.h_over_epsilon, next.moment_defect, next.lower_moment, next.sum_abs, next.spectral_bound]);
         self.negative_weights += next.negative_weights;
         self.allowed += next.allowed;
         self.condition = self.condition.max(next.condition);
@@ -78,37 +111,50 @@ impl Report {
         for (rows, next) in self.rungs.iter_mut().zip(next.rungs) {
             *rows += next;
         }
-        if let Some(worst) = &next.worst {
-            self.rank(worst);
-        }
+        self.conditions.merge(&next.conditions);
+        self.residuals.merge(&next.residuals);
+        self.sums.merge(&next.sums);
+        self.order = lower(self.order, next.order);
+        self.grown += next.grown;
+        self.lowered += next.lowered;
+        self.empty += next.empty;
+        next.worst_rows().for_each(|row| self.rank(row));
     }
 
-    fn extremes(&mut self, h_over_epsilon: f64, moment_defect: f64, sum_abs: f64, spectral_bound: f64) {
-        self.h_over_epsilon = worse(self.h_over_epsilon, h_over_epsilon);
-        self.moment_defect = worse(self.moment_defect, moment_defect);
-        self.sum_abs = worse(self.sum_abs, sum_abs);
-        self.spectral_bound = worse(self.spectral_bound, spectral_bound);
+    fn extremes(&mut self, others: [f64; 5]) {
+        let own = [
+            &mut self.h_over_epsilon,
+            &mut self.moment_defect,
+            &mut self.lower_moment,
+            &mut self.sum_abs,
+            &mut self.spectral_bound,
+        ];
+        own.into_iter().zip(others).for_each(|(own, other)| *own = larger(*own, other));
     }
 
-    /// A breach without leave outranks one with leave, which outranks none; of equals the first row stays.
+    /// A breach without leave outranks one with leave, which outranks none; of equals the first row stays ahead.
     fn rank(&mut self, row: &RowReport) {
         let key = |row: &RowReport| {
             let refused = row.breach.is_some() && !row.allowed;
             let defect = if row.moment_defect.is_nan() { f64::INFINITY } else { row.moment_defect };
-            (refused, row.severity(), defect, row.condition)
+            (refused, row.empty, row.lowered, row.severity(), defect, row.condition)
         };
-        let worse = match &self.worst {
-            None => true,
-            Some(worst) => key(row).partial_cmp(&key(worst)) == Some(std::cmp::Ordering::Greater),
+        let ahead = |known: &Option<RowReport>| {
+            known.is_none_or(|known| key(row).partial_cmp(&key(&known)) == Some(std::cmp::Ordering::Greater))
         };
-        if worse {
-            self.worst = Some(*row);
+        // Almost every row ends here.
+        if !self.worst.last().is_some_and(ahead) {
+            return;
+        }
+        if let Some(at) = self.worst.iter().position(ahead) {
+            self.worst[at..].rotate_right(1);
+            self.worst[at] = Some(*row);
         }
     }
 
     /// Refuses the build where a row breaks a limit without leave.
     pub(super) fn accept(&self) -> Result<()> {
-        match &self.worst {
+        match self.worst() {
             Some(RowReport { breach: Some(breach), allowed: false, target, .. }) => Err(breach.refuse(*target)),
             _ => Ok(()),
         }
@@ -116,6 +162,14 @@ impl Report {
 }
 
 /// The larger of two figures, NaN being the largest of all: a method that knows nothing must not look perfect.
-fn worse(a: f64, b: f64) -> f64 {
+fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
+}
+
+/// The lower of two orders, where one is stated.
+fn lower(a: Option<u32>, b: Option<u32>) -> Option<u32> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(a.min(b)),
+        (a, b) => a.or(b),
+    }
 }

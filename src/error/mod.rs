@@ -54,25 +54,33 @@ pub type Result<T> = std::result::Result<T, Error>;
 pub struct Error {
     kind: ErrorKind,
     particle: Option<usize>,
+    wanted_cutoff: Option<f64>,
 }
 
 impl Error {
     /// An error of the given kind that concerns no particle in particular.
     pub fn new(kind: impl Into<ErrorKind>) -> Self {
-        Self { kind: kind.into(), particle: None }
+        Self { kind: kind.into(), particle: None, wanted_cutoff: None }
     }
 
     /// An error of the user's own, for right-hand sides, providers and methods outside this crate.
     ///
     /// `code` is handed back unchanged in [`ErrorKind::User`].
     pub fn user(code: i64) -> Self {
-        Self { kind: ErrorKind::User { code }, particle: None }
+        Self::new(ErrorKind::User { code })
     }
 
     /// Names the particle (or target) concerned.
     #[must_use]
     pub fn at(mut self, particle: usize) -> Self {
         self.particle = Some(particle);
+        self
+    }
+
+    /// Names the cutoff a neighbor provider should be built with before the call is tried again.
+    #[must_use]
+    pub fn wanting(mut self, cutoff: f64) -> Self {
+        self.wanted_cutoff = Some(cutoff);
         self
     }
 
@@ -85,6 +93,11 @@ impl Error {
     pub fn particle(&self) -> Option<usize> {
         self.particle
     }
+
+    /// The cutoff to build the neighbor provider with, where a wider one may help.
+    pub fn wanted_cutoff(&self) -> Option<f64> {
+        self.wanted_cutoff
+    }
 }
 
 impl fmt::Display for Error {
@@ -92,7 +105,17 @@ impl fmt::Display for Error {
         if let Some(particle) = self.particle {
             write!(f, "particle {particle}: ")?;
         }
-        match &self.kind {
+        self.kind.fmt(f)?;
+        match self.wanted_cutoff {
+            Some(cutoff) => write!(f, "; a provider built with the cutoff {cutoff} may serve"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for ErrorKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             ErrorKind::MultiIndex(kind) => kind.fmt(f),
             ErrorKind::Kernel(kind) => kind.fmt(f),
             ErrorKind::Domain(kind) => kind.fmt(f),

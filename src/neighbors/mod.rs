@@ -8,6 +8,7 @@ mod grid;
 mod links;
 mod list;
 mod measure;
+mod nearest;
 mod order;
 mod placed;
 mod row_check;
@@ -18,6 +19,7 @@ pub use canonical::Canonical;
 pub use cell_list::CellList;
 pub use list::NeighborList;
 pub use measure::{epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors};
+pub use nearest::Nearest;
 
 use crate::error::Result;
 use crate::stencil::{Neighbor, Stencil};

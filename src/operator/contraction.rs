@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::method::{Method, RowReport};
+use super::method::Method;
+use super::row_report::RowReport;
 use crate::error::{Error, OperatorError, ParticleError, Result};
 use crate::stencil::Stencil;
 

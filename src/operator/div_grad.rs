@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::method::{Method, RowReport, spread};
+use super::method::{Method, spread};
+use super::row_report::RowReport;
 use crate::error::{Error, OperatorError, ParticleError, Result};
 use crate::stencil::Stencil;
 

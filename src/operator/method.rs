@@ -1,9 +1,13 @@
 //! The one seam every discretization method implements: a stencil goes in, weights come out.
 
+use super::draft::Draft;
 use super::expression::Outputs;
-use crate::error::{Error, OperatorError, Result};
-use crate::moment::Rung;
+use super::row_report::RowReport;
+use crate::error::{Error, Result};
 use crate::stencil::Stencil;
+
+/// Factor by which a support is widened where a row is refused.
+pub const GROWTH: f64 = 1.15;
 
 /// How a stencil becomes weights: the only trait a new method implements.
 ///
@@ -70,159 +74,34 @@ pub trait Method<const D: usize>: Sync {
         w: &[Self::Out],
         diagonal: &Self::Out,
     ) -> Result<RowReport>;
-}
 
-/// What is known about one row.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct RowReport {
-    /// The target.
-    pub target: usize,
-    /// Number of neighbors n.
-    pub neighbors: usize,
-    /// h/epsilon, with h = V^(1/D).
-    pub h_over_epsilon: f64,
-    /// Relative defect of the discrete moments that are checked.
-    pub moment_defect: f64,
-    /// The largest moment M_alpha with 0 < |alpha| < m, relative to the required ones: zero on lattices, and not
-    /// checked. It adds M_alpha D^alpha f / epsilon^(m - |alpha|) to the result, which grows under refinement.
-    pub lower_moment: f64,
-    /// Number of moment conditions l that were solved for; 0 where none were.
-    pub conditions: usize,
-    /// Their rank on this stencil.
-    pub rank: usize,
-    /// Estimated condition number of the windowed, scaled monomials; 0 where no system was solved.
-    pub condition: f64,
-    /// The largest miss of a moment condition, in scaled units.
-    pub residual: f64,
-    /// Which solver found the weights.
-    pub rung: Option<Rung>,
-    /// |d_p| + sum_q |w_pq|, the largest over the outputs: the gain of noise, in units of the operator.
-    pub sum_abs: f64,
-    /// Pairs whose weight is negative before the sign of an image; for a Laplacian each costs the maximum principle.
-    pub negative_weights: usize,
-    /// The bound this row sets on the modulus of the eigenvalues of the operator, in units of the operator.
-    pub spectral_bound: f64,
-    /// The limit this row breaks, if any.
-    pub breach: Option<Breach>,
-    /// Whether the caller allowed this row to break it.
-    pub allowed: bool,
-}
-
-impl RowReport {
-    /// A report of a row without defects; a method fills in what it knows.
-    ///
-    /// `sum_abs` and the general bound 2 `sum_abs` on the eigenvalues (Gershgorin) are taken from the weights.
-    pub fn of<const D: usize, S: Outputs>(row: &Stencil<D>, w: &[S], diagonal: &S) -> Self {
-        let gain =
-            |k: usize| w.iter().fold(diagonal.as_slice()[k].abs(), |sum, weight| sum + weight.as_slice()[k].abs());
-        let sum_abs = (0..S::K).map(gain).fold(0.0, f64::max);
-        Self {
-            target: row.target(),
-            neighbors: row.len(),
-            h_over_epsilon: 0.0,
-            moment_defect: 0.0,
-            lower_moment: 0.0,
-            conditions: 0,
-            rank: 0,
-            condition: 0.0,
-            residual: 0.0,
-            rung: None,
-            sum_abs,
-            negative_weights: 0,
-            spectral_bound: 2.0 * sum_abs,
-            breach: None,
-            allowed: false,
+    /// The weights and reports of several targets at once: the same bits as one by one, for less. A method that can
+    /// work on many stencils side by side overrides it.
+    fn weights_batch(&self, drafts: &mut [Draft<D, Self::Out>], scratch: &mut Self::Scratch) {
+        for draft in drafts {
+            draft.report = self
+                .weights(&draft.stencil, scratch, &mut draft.weights, &mut draft.diagonal)
+                .and_then(|()| draft.finite())
+                .and_then(|()| self.report(&draft.stencil, scratch, &draft.weights, &draft.diagonal));
         }
     }
 
-    /// How badly the row breaks its limits: above 1 where it does, otherwise 0.
-    pub fn severity(&self) -> f64 {
-        self.breach.map_or(0.0, |breach| breach.severity())
-    }
-}
-
-/// A limit that a row breaks.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Breach {
-    /// h/epsilon is above what the kernel bears.
-    Overlap {
-        /// h/epsilon.
-        h_over_epsilon: f64,
-        /// The largest legal value.
-        limit: f64,
-    },
-    /// The discrete moments miss their conditions.
-    Moment {
-        /// The relative defect.
-        defect: f64,
-        /// The largest legal value.
-        limit: f64,
-    },
-}
-
-impl Breach {
-    /// How many times the limit was reached; infinite for NaN.
-    pub fn severity(&self) -> f64 {
-        let ratio = match *self {
-            Self::Overlap { h_over_epsilon, limit } => h_over_epsilon / limit,
-            Self::Moment { defect, limit } => defect / limit,
-        };
-        if ratio.is_nan() { f64::INFINITY } else { ratio }
+    /// How many times the support of a refused row is widened by [`GROWTH`], as far as the provider reaches, before
+    /// [`stand_in`](Self::stand_in) is asked.
+    fn growths(&self) -> u32 {
+        0
     }
 
-    /// The error a build fails with when this breach is not allowed.
-    pub fn refuse(&self, target: usize) -> Error {
-        let kind = match *self {
-            Self::Overlap { h_over_epsilon, limit } => OperatorError::Overlap { h_over_epsilon, limit },
-            Self::Moment { defect, limit } => OperatorError::Moment { defect, limit },
-        };
-        Error::from(kind).at(target)
-    }
-}
-
-/// A set of targets.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Targets {
-    sorted: Vec<usize>,
-}
-
-/// Where a caller allows rows to break their limits.
-///
-/// ```
-/// use parops::Allowance;
-/// let some = Allowance::at([9, 5, 1]);
-/// assert!(some.covers(1) && some.covers(9) && !some.covers(2));
-/// assert!(Allowance::Everywhere.covers(2) && !Allowance::default().covers(1));
-/// ```
-#[derive(Clone, Debug, Default, PartialEq)]
-pub enum Allowance {
-    /// Nowhere: a breach fails the build.
-    #[default]
-    Nowhere,
-    /// At these targets; made by [`Allowance::at`].
-    At(Targets),
-    /// Everywhere; the report still says where.
-    Everywhere,
-}
-
-impl Allowance {
-    /// At these targets, in any order.
-    pub fn at(targets: impl IntoIterator<Item = usize>) -> Self {
-        let mut sorted: Vec<_> = targets.into_iter().collect();
-        sorted.sort_unstable();
-        sorted.dedup();
-        Self::At(Targets { sorted })
+    /// Whether a wider support may help against this refusal.
+    fn can_grow(&self, refusal: &Error) -> bool {
+        let _ = refusal;
+        false
     }
 
-    /// Whether it covers target p.
-    pub fn covers(&self, p: usize) -> bool {
-        match self {
-            Self::Nowhere => false,
-            Self::At(targets) => targets.sorted.binary_search(&p).is_ok(),
-            Self::Everywhere => true,
-        }
+    /// What stands in for a row refused at its widest support: another row and its report, or, as here, the refusal
+    /// that `draft.report` holds.
+    fn stand_in(&self, draft: &mut Draft<D, Self::Out>, scratch: &mut Self::Scratch) {
+        let _ = (draft, scratch);
     }
 }
 

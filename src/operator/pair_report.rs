@@ -1,7 +1,7 @@
 //! What is checked and known of a row of fixed kernels: overlap, moments, eigenvalues.
 
-use super::method::{Breach, RowReport};
 use super::pairwise::{PairScratch, Pairing, Pairwise, times};
+use super::row_report::{Breach, RowReport};
 use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::moment::required_moment;

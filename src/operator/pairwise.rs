@@ -1,6 +1,8 @@
 //! What PSE and SPH share: a fixed kernel, weighted by the volumes, with overlap and moments checked per row.
 
-use super::method::{Allowance, spread};
+use super::allowance::Allowance;
+use super::draft::finite;
+use super::method::spread;
 use crate::error::{MultiIndexError, OperatorError, ParticleError, Result};
 use crate::kernel::Kernel;
 use crate::multi_index::common_degree;
@@ -176,7 +178,7 @@ impl<K, const N: usize> Pairwise<K, N> {
                 *own = if row.center().is_some() { *own + self.own(kernel, row)? * scale } else { 0.0 };
             }
         }
-        finite(row, w, diagonal)
+        finite(row, w.iter().map(<[f64; N]>::as_slice), diagonal)
     }
 
     /// eta of every output at every neighbor.
@@ -201,17 +203,6 @@ pub(super) fn times(value: f64, factor: f64, count: usize) -> f64 {
 
 fn positive(value: f64) -> Result<f64> {
     if value > 0.0 && value.is_finite() { Ok(value) } else { Err(OperatorError::Setting { value }.into()) }
-}
-
-fn finite<const D: usize, const N: usize>(row: &Stencil<D>, w: &[[f64; N]], diagonal: &[f64; N]) -> Result<()> {
-    let own = (row.center().unwrap_or(row.target()), diagonal);
-    let pairs = row.sources().iter().map(|&q| q as usize).zip(w);
-    for (q, weights) in pairs.chain([own]) {
-        if let Some(&weight) = weights.iter().find(|weight| !weight.is_finite()) {
-            return Err(OperatorError::Weight { q, weight }.into());
-        }
-    }
-    Ok(())
 }
 
 /// The settings and the [`Method`](super::Method) that every method built on [`Pairwise`] has, for a tuple struct

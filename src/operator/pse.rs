@@ -1,8 +1,10 @@
 //! Particle strength exchange: kernels that satisfy the moment conditions of the operator itself.
 
+use super::allowance::Allowance;
 use super::expression::{Operator, collect};
-use super::method::{Allowance, Method, RowReport};
+use super::method::Method;
 use super::pairwise::{PairScratch, Pairing, Pairwise, pairwise_method};
+use super::row_report::RowReport;
 use crate::error::{OperatorError, Result};
 use crate::kernel::{Exchange, Kernel};
 use crate::scale::{Cutoff, Epsilon, Volumes};

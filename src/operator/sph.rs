@@ -1,8 +1,10 @@
 //! Smoothed particle hydrodynamics: one smoothing kernel, differentiated.
 
+use super::allowance::Allowance;
 use super::expression::{Operator, collect};
-use super::method::{Allowance, Method, RowReport};
+use super::method::Method;
 use super::pairwise::{PairScratch, Pairing, Pairwise, pairwise_method};
+use super::row_report::RowReport;
 use crate::error::{OperatorError, Result};
 use crate::kernel::{Kernel, SmoothingKernel};
 use crate::multi_index::Term;

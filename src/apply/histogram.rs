@@ -1,0 +1,83 @@
+//! How a figure of the certificate is spread over the rows.
+
+/// Number of rows per decade of a figure.
+///
+/// Bin i counts the rows with 10^(i - 32) <= x < 10^(i - 31); the first bin takes what is smaller, zero included, the
+/// last what is larger, NaN included.
+///
+/// ```
+/// use parops::Histogram;
+/// let mut rows = Histogram::default();
+/// [0.0, 3e-16, 4e-16, 20.0, f64::NAN].into_iter().for_each(|x| rows.add(x));
+/// assert_eq!((rows.total(), rows.at(3e-16), rows.at(99.0)), (5, 2, 1));
+/// assert_eq!(rows.decades().nth(1), Some((1e-16, 2)));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Histogram {
+    counts: [usize; BINS],
+}
+
+const BINS: usize = 64;
+/// The exponent of the lower edge of the first bin.
+const LOWEST: i32 = -32;
+
+impl Default for Histogram {
+    fn default() -> Self {
+        Self { counts: [0; BINS] }
+    }
+}
+
+impl Histogram {
+    /// Counts one row.
+    pub fn add(&mut self, x: f64) {
+        self.counts[bin(x)] += 1;
+    }
+
+    /// Adds the counts of other rows.
+    pub fn merge(&mut self, other: &Self) {
+        self.counts.iter_mut().zip(other.counts).for_each(|(count, more)| *count += more);
+    }
+
+    /// Number of rows counted.
+    pub fn total(&self) -> usize {
+        self.counts.iter().sum()
+    }
+
+    /// Number of rows in the decade of x.
+    pub fn at(&self, x: f64) -> usize {
+        self.counts[bin(x)]
+    }
+
+    /// The decades that hold rows: their lower edges and the number of rows, ascending.
+    pub fn decades(&self) -> impl Iterator<Item = (f64, usize)> + '_ {
+        EDGES.into_iter().zip(self.counts).filter(|&(_, count)| count > 0)
+    }
+}
+
+fn bin(x: f64) -> usize {
+    if !(x < EDGES[BINS - 1]) {
+        return BINS - 1;
+    }
+    // The binary exponent names the decade but for one, without a logarithm.
+    let exponent = (x.to_bits() >> 52) as i32 - 1023;
+    let decade = ((exponent * 315_653) >> 20) - LOWEST;
+    let guess = decade.clamp(0, BINS as i32 - 1) as usize;
+    guess + usize::from(guess + 1 < BINS && x >= EDGES[guess + 1])
+}
+
+/// Lower edges of the bins.
+const EDGES: [f64; BINS] = {
+    let mut edges = [1.0; BINS];
+    let one = -LOWEST as usize;
+    let mut power = 1.0;
+    let mut i = 0;
+    while i <= one {
+        edges[one - i] = 1.0 / power;
+        if one + i < BINS {
+            edges[one + i] = power;
+        }
+        power *= 10.0;
+        i += 1;
+    }
+    edges
+};
