@@ -10,7 +10,8 @@ type Failure = Result<(), parops::Error>;
 /// Scattered particles of spacing 0.02 around an empty disk, and a line of particles across it, so that the nearest
 /// neighbors of those in the middle all lie on the line.
 fn line_in_a_hole() -> Particles<2> {
-    let mut points: Vec<[f64; 2]> = Particles::jittered([-0.5; 2], [0.5; 2], [50; 2], 0.3, 7).unwrap().points().to_vec();
+    let mut points: Vec<[f64; 2]> =
+        Particles::jittered([-0.5; 2], [0.5; 2], [50; 2], 0.3, 7).unwrap().points().to_vec();
     points.retain(|x| x[0].hypot(x[1]) > 0.1);
     points.extend((-9..=9).map(|i| [0.01 * f64::from(i), 0.0]));
     Particles::new(points).unwrap()
@@ -141,7 +142,9 @@ fn rows_are_left_empty_and_flagged_where_the_caller_allows_it() -> Failure {
     // A window that is flat is no matter of support: it stays an error.
     let flat = dcpse.epsilon(parops::Epsilon::global(50.0)?);
     let error = flat.assemble(&neighbors).unwrap_err();
-    assert!(matches!(error.kind(), ErrorKind::Operator(OperatorError::Window { .. })) && error.wanted_cutoff().is_none());
+    assert!(
+        matches!(error.kind(), ErrorKind::Operator(OperatorError::Window { .. })) && error.wanted_cutoff().is_none()
+    );
     Ok(())
 }
 
