@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use parops::{
     Apply, ApplyError, BoundaryCondition, BoundaryError, BoundaryRows, CellList, CsrMatrix, Cutoff, DcPse, Domain,
-    ErrorKind, Face, Gradient, Laplacian, LinearError, MultiIndex, MultiIndexError, Nearest, OperatorError,
-    Particles, Plan, Random, Rk4, Rows, Sign, SparseSolver, StepLimit, graded, integrate,
+    ErrorKind, Face, Gradient, Laplacian, LinearError, MultiIndex, MultiIndexError, Nearest, OperatorError, Particles,
+    Plan, Random, Rk4, Rows, Sign, SparseSolver, StepLimit, graded, integrate,
 };
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
@@ -85,7 +85,13 @@ impl<const D: usize> Polynomial<D> {
         std::array::from_fn(|axis| {
             let slope = |(alpha, c): &(MultiIndex<D>, f64)| {
                 let exponents: [i32; D] = std::array::from_fn(|i| i32::from(alpha.exponents()[i]));
-                let factor = |i: usize| if i == axis { f64::from(exponents[i]) * power(x[i], exponents[i] - 1) } else { power(x[i], exponents[i]) };
+                let factor = |i: usize| {
+                    if i == axis {
+                        f64::from(exponents[i]) * power(x[i], exponents[i] - 1)
+                    } else {
+                        power(x[i], exponents[i])
+                    }
+                };
                 c * (0..D).map(factor).product::<f64>()
             };
             self.0.iter().map(slope).sum()
@@ -488,7 +494,8 @@ fn conditions_that_are_none_are_refused_with_their_particle() {
     let set = Walled::<2>::new(8, 0.3, 1);
     let fine = [Condition::robin(5, [f64::NAN; 2], 1.0, 0.0), Condition::neumann(6, [0.0, -1.0 - 5e-9])];
     assert!(BoundaryRows::build(&fine, 2, &set.cells(2, 3.0)).is_ok());
-    let (kind, _) = BoundaryRows::build(&fine, 9, &set.cells(2, 3.0)).map(|_| ()).map_err(|e| (e.kind().clone(), ())).unwrap_err();
+    let (kind, _) =
+        BoundaryRows::build(&fine, 9, &set.cells(2, 3.0)).map(|_| ()).map_err(|e| (e.kind().clone(), ())).unwrap_err();
     assert_eq!(kind, MultiIndexError::Order { order: 9, low: 1, high: 8 }.into());
 }
 
@@ -506,7 +513,7 @@ fn reach_that_holds_too_few_neighbors_is_refused_with_the_particle() {
 #[test]
 fn target_that_is_no_particle_bears_no_condition() {
     let set = Walled::<2>::new(8, 0.0, 1);
-    
+
     let cells = CellList::build_at(&[[0.0, 0.5]], &set.particles, &Domain::open(), Cutoff(0.5)).unwrap();
     let error = BoundaryRows::build(&[BoundaryCondition::neumann(0, [-1.0, 0.0])], 2, &cells).unwrap_err();
     assert_eq!(error.kind(), &BoundaryError::Particle { particle: 0, particles: 81 }.into());
@@ -551,7 +558,10 @@ fn conditions_that_do_not_determine_the_boundary_are_refused() {
     let own = plain.matrix().triplets().find(|entry| entry.1 == 20).unwrap().2;
     let error = BoundaryRows::build(&[BoundaryCondition::robin(20, [1.0], -own, 1.0)], 2, &cells).unwrap_err();
     let kind = error.kind();
-    assert!(matches!(kind, ErrorKind::Linear(LinearError::Singular { .. } | LinearError::ZeroPivot { .. })), "{kind:?}");
+    assert!(
+        matches!(kind, ErrorKind::Linear(LinearError::Singular { .. } | LinearError::ZeroPivot { .. })),
+        "{kind:?}"
+    );
 }
 
 #[test]

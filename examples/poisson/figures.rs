@@ -49,8 +49,7 @@ fn panels<const D: usize>(
     range: [f64; 2],
     place: impl Fn(f64, &[f64; D]) -> Option<[f64; 2]>,
 ) -> Drawn {
-    let finest: Vec<&Solved<D>> =
-        all.chunk_by(|a, b| a.order == b.order).filter_map(|series| series.last()).collect();
+    let finest: Vec<&Solved<D>> = all.chunk_by(|a, b| a.order == b.order).filter_map(|series| series.last()).collect();
     let dots = |solved: &Solved<D>, values: &[f64]| -> Vec<Dot> {
         let places = solved.points.iter().zip(values);
         places.filter_map(|(x, &value)| Some((place(solved.h, x)?, value))).collect()

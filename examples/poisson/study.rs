@@ -14,18 +14,16 @@ const BAND: f64 = 0.3;
 /// Particles along the square and across the ball, refinement after refinement.
 fn sides(quick: bool, dim: usize) -> &'static [usize] {
     match (quick, dim) {
-        (true, 2) => &[16, 24, 32],
-        (true, _) => &[8, 10, 12],
-        (false, 2) => &[24, 36, 54, 80],
-        (false, _) => &[10, 13, 16, 20],
+        (true, 2) => &[24, 36, 54],
+        (true, _) => &[12, 16, 20],
+        (false, 2) => &[24, 36, 54, 80, 120],
+        (false, _) => &[12, 16, 20, 25],
     }
 }
 
 /// Runs the study; whether every observed order is high enough.
 pub fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
-    println!(
-        "dim  r       N boundary entries    L2 error  Linf error  order       cond  residual  build s  solve s"
-    );
+    println!("dim  r       N boundary entries    L2 error  Linf error  order       cond  residual  build s  solve s");
     let mut csv = String::from(
         "dim,order,h,n,boundary,entries,error_l2,error_linf,observed_order,condition,residual,build_s,solve_s\n",
     );

@@ -1,8 +1,9 @@
 //! Conditions as equations: one row per boundary particle.
 
+use super::chosen::Chosen;
 use super::condition::BoundaryCondition;
 use super::coupled::{BoundaryReport, Coupled};
-use super::chosen::Chosen;
+use super::outward::Outward;
 use crate::apply::{Field, Report, Rows};
 use crate::error::{ApplyError, BoundaryError, Error, Result};
 use crate::linear::CsrMatrix;
@@ -20,9 +21,10 @@ const NEIGHBORS_PER_CONDITION: f64 = 3.0;
 /// [`impose`](Self::impose) finds the boundary values that follow from the others, as an evolution needs them;
 /// [`matrix`](Self::matrix) and [`replace_in`](Self::replace_in) give the equations to a steady problem.
 ///
-/// A row takes the 3 l nearest particles, ties included, boundary ones among them: l = C(D + r, D) - 1 for order r. It
-/// is exact for polynomials u of degree r, so that boundary values are as accurate as an operator of order r. One solve
-/// and one weight per pair a row; made once per particle set.
+/// A row takes the 3 l nearest particles, ties included, boundary ones among them: l = C(D + r, D) - 1 for order r. Where
+/// u_p has too small a weight in du/dn the support is widened by 1.15 up to three times, as far as the provider reaches;
+/// the report says how often. A row is exact for polynomials u of degree r, so that boundary values are as accurate as an
+/// operator of order r. One solve and one weight per pair a row; made once per particle set.
 ///
 /// ```
 /// use parops::{BoundaryCondition, BoundaryRows, CellList, Cutoff, Domain, Particles};
@@ -56,7 +58,8 @@ impl BoundaryRows {
     /// Naming the particle: [`BoundaryError::Particle`] for one that is no target, [`BoundaryError::Repeated`] for two
     /// conditions at one particle, [`BoundaryError::Factors`] where a and b are both zero or not finite,
     /// [`BoundaryError::Normal`] for a normal that is no unit vector,
-    /// [`OperatorError::TooFew`](crate::OperatorError::TooFew) where the reach holds fewer than 3 l neighbors, and what
+    /// [`OperatorError::TooFew`](crate::OperatorError::TooFew) where the reach holds fewer than 3 l neighbors,
+    /// [`BoundaryError::OwnWeight`] where u_p has no or a negative weight within the reach, and what
     /// else [`Rows::assemble`] refuses. [`MultiIndexError::Order`](crate::MultiIndexError::Order) for an illegal order.
     /// [`LinearError::Singular`](crate::LinearError::Singular) where the conditions do not determine the boundary values,
     /// and what else [`SparseSolver::new`](crate::SparseSolver::new) refuses.
@@ -86,7 +89,7 @@ impl BoundaryRows {
         let at: Vec<usize> = flux.iter().map(|condition| condition.particle()).collect();
         let normals: Vec<[f64; D]> = flux.iter().map(|condition| condition.unit_normal()).collect();
         let chosen = Chosen::new(neighbors, &at, gradient.fewest_neighbors::<D>()?)?;
-        let normal = Contraction::new(gradient.clone(), normals)?;
+        let normal = Outward::new(Contraction::new(gradient.clone(), normals)?);
         let name = |error: Error| match error.particle().and_then(|i| at.get(i)) {
             Some(&p) => error.at(p),
             None => error,

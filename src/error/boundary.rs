@@ -33,6 +33,13 @@ kinds! {
             /// The factor of du/dn.
             b: f64,
         } => "a u + b du/dn = g with a = {a} and b = {b} is no condition",
+        /// A normal derivative that hardly depends on the value at its own particle.
+        OwnWeight {
+            /// The weight of that value in the sum of all absolute weights.
+            share: f64,
+            /// What is asked for.
+            least: f64,
+        } => "the value here has the share {share} in the weights of its normal derivative, not {least}",
         /// A right side g that is not finite.
         Value {
             /// The value.
