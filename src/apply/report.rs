@@ -83,6 +83,11 @@ impl Report {
         self.worst_rows().next()
     }
 
+    /// Names the targets anew, where they are some of a larger set.
+    pub(crate) fn rename(&mut self, name: impl Fn(usize) -> usize) {
+        self.worst.iter_mut().flatten().for_each(|row| row.target = name(row.target));
+    }
+
     pub(super) fn add(&mut self, row: &RowReport) {
         self.fewest = if self.rows == 0 { row.neighbors } else { self.fewest.min(row.neighbors) };
         self.most = self.most.max(row.neighbors);
