@@ -35,7 +35,16 @@ fn holds<const D: usize, const K: usize, T: Field>(
 /// Every derivative of degree at most 2 in one and two dimensions; `wave` and `targets` as in [`Series`].
 fn every_operator<T: Field>(set: Set, order: u32, even: bool, wave: [f64; 2], targets: usize, sides: [Vec<usize>; 2]) {
     let [line, plane] = sides;
-    let on = |wave: f64, sides: &[usize]| Series { set, even, order, sides: sides.to_vec(), wave, targets, seeds: 5, faces: true };
+    let on = |wave: f64, sides: &[usize]| Series {
+        set,
+        even,
+        order,
+        sides: sides.to_vec(),
+        wave,
+        targets,
+        seeds: 5,
+        faces: true,
+    };
     for degree in 0..=2 {
         let wave = wave[usize::from(degree == 2)];
         match degree {
@@ -81,7 +90,16 @@ fn order_of_single_precision_fields_is_the_design_order() {
 #[test]
 fn odd_orders_on_lattices_with_whole_shells_are_one_higher() {
     for order in [1, 3] {
-        let series = |sides| Series { set: Set::Lattice, even: false, order, sides, wave: 0.4, targets: 200, seeds: 1, faces: true };
+        let series = |sides| Series {
+            set: Set::Lattice,
+            even: false,
+            order,
+            sides,
+            wave: 0.4,
+            targets: 200,
+            seeds: 1,
+            faces: true,
+        };
         holds::<1, 1, f64>(OfDegree::<1>(1), &series(sides::<1>()));
         holds::<1, 1, f64>(OfDegree::<1>(2), &series(sides::<1>()));
         holds::<2, 2, f64>(OfDegree::<2>(1), &series(sides::<2>()));
@@ -105,8 +123,16 @@ fn order_on_quasi_random_sets_is_the_design_order() {
     // Such a set is locally a lattice that changes with N, and the constant of the error with it: many numbers.
     let sides: Vec<usize> = (0..28).map(|i| (24.0 * 4.0_f64.powf(f64::from(i) / 27.0)).round() as usize).collect();
     for (order, wave) in [(2, 0.3), (4, 0.7)] {
-        let series =
-            Series { set: Set::QuasiRandom, even: false, order, sides: sides.clone(), wave, targets: 60, seeds: 5, faces: true };
+        let series = Series {
+            set: Set::QuasiRandom,
+            even: false,
+            order,
+            sides: sides.clone(),
+            wave,
+            targets: 60,
+            seeds: 5,
+            faces: true,
+        };
         holds::<2, 2, f64>(OfDegree::<2>(1), &series);
         holds::<2, 3, f64>(OfDegree::<3>(2), &series);
     }

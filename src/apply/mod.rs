@@ -1,19 +1,23 @@
 //! Operators applied to fields: stored rows, or weights made anew for every application.
 
 mod assemble;
+pub(crate) mod blocks;
 mod composed;
+mod export;
 mod fields;
 mod histogram;
-pub(crate) mod blocks;
 mod matrix_free;
 mod report;
 mod rows;
+#[cfg(feature = "serde")]
+mod saved;
 mod splice;
 mod strided;
 mod sweep;
 mod vector;
 mod worker;
 
+pub use export::RawRows;
 pub use histogram::Histogram;
 pub use matrix_free::MatrixFree;
 pub use report::Report;
@@ -49,6 +53,29 @@ pub trait Apply<T: Field>: Sync {
     /// particle whose value is not finite; `out` is then as it was. [`ApplyError::Overflow`] naming the first target
     /// whose result is not finite.
     fn apply(&self, f: &[T], out: &mut [T]) -> Result<()>;
+
+    /// du = L u as a right-hand side `f(t, &u, &mut du)`, for [`integrate`](crate::integrate), the steppers, and any
+    /// other integrator that calls a closure; a state is a slice, a vector or an array. From a `dyn Apply` write
+    /// `|_, u, du| operator.apply(u, du)`.
+    ///
+    /// # Errors
+    /// Of the closure: as [`apply`](Self::apply).
+    ///
+    /// ```
+    /// use parops::{Apply, CsrMatrix, Plan, Rk4, integrate};
+    /// let decay = CsrMatrix::from_triplets(2, 2, [(0, 0, -1.0), (1, 1, -2.0)])?;
+    /// let mut u = vec![1.0, 1.0];
+    /// integrate(&mut Rk4::new(), &mut u, &Plan::new(0.0, 1.0, 0.01)?, decay.rhs(), |_, _, _| {})?;
+    /// assert!((u[1] - (-2.0_f64).exp()).abs() < 1e-8);
+    /// # parops::Result::Ok(())
+    /// ```
+    fn rhs<U>(&self) -> impl Fn(f64, &U, &mut U) -> Result<()>
+    where
+        Self: Sized,
+        U: AsRef<[T]> + AsMut<[T]> + ?Sized,
+    {
+        |_, u, du| self.apply(u.as_ref(), du.as_mut())
+    }
 }
 
 /// Checks a field and an output before anything is written.

@@ -88,7 +88,8 @@ fn mend<const D: usize, M: Method<D>, P: Neighbors<D>>(
     scratch: &mut M::Scratch,
 ) -> Result<()> {
     let p = draft.stencil.target();
-    for grown in 1..=method.growths() {
+    let mut grown = 0;
+    while grown < method.growths() {
         let (before, refusal) = (draft.stencil.cutoff(), draft.report.clone());
         let wider = (GROWTH * before).min(neighbors.reach());
         let helps = refusal.as_ref().is_err_and(|refusal| method.can_grow(refusal));
@@ -96,6 +97,7 @@ fn mend<const D: usize, M: Method<D>, P: Neighbors<D>>(
             break;
         }
         gather(neighbors, p, wider, draft)?;
+        grown += 1;
         method.weights_batch(std::slice::from_mut(draft), scratch);
         match &mut draft.report {
             Ok(report) => {
@@ -109,8 +111,11 @@ fn mend<const D: usize, M: Method<D>, P: Neighbors<D>>(
     }
     let wanted = GROWTH * draft.stencil.cutoff();
     method.stand_in(draft, scratch);
-    match &draft.report {
-        Ok(_) => Ok(()),
+    match &mut draft.report {
+        Ok(report) => {
+            report.grown = grown;
+            Ok(())
+        }
         Err(refusal) if method.can_grow(refusal) => Err(refusal.clone().wanting(wanted).at(p)),
         Err(refusal) => Err(refusal.clone().at(p)),
     }

@@ -306,7 +306,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// The Euclidean norm; the vectors here are scaled, so squares do not overflow.
-pub(super) fn norm(x: &[f64]) -> f64 {
+fn norm(x: &[f64]) -> f64 {
     dot(x, x).sqrt()
 }
 
@@ -314,4 +314,12 @@ pub(super) fn norm(x: &[f64]) -> f64 {
 pub(super) fn inverse_power(x: f64) -> f64 {
     let exponent = ((x.to_bits() >> 52) as i64 - 1023).clamp(-1000, 1000);
     f64::from_bits(((1023 - exponent) as u64) << 52)
+}
+
+/// |a|_2 / |b|_2 for vectors of any scale.
+pub(super) fn ratio(a: &[f64], b: &[f64]) -> f64 {
+    let largest = |x: &[f64]| x.iter().fold(f64::MIN_POSITIVE, |largest, x| largest.max(x.abs()));
+    let scale = inverse_power(largest(a).max(largest(b)));
+    let norm = |x: &[f64]| x.iter().fold(0.0, |sum, x| sum + (x * scale) * (x * scale)).sqrt();
+    norm(a) / norm(b)
 }

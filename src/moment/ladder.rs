@@ -22,7 +22,7 @@ impl MomentSolver for Ladder {
         w: &mut [T],
     ) -> Result<Solution<T>> {
         if let Ok(solution) = Cholesky.solve(system, scratch, w)
-            && solution.is_sharp(system)
+            && solution.is_sharp(system.conditions(), system.largest_required())
         {
             return Ok(solution);
         }

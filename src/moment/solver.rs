@@ -6,6 +6,7 @@ use crate::scalar::Scalar;
 
 /// Which method found the weights of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Rung {
     /// LU of A = B^T B, as in the notes.
@@ -74,20 +75,25 @@ impl<T: Scalar> Solution<T> {
     /// The estimate is of B with its columns scaled. Before that, cond(B) is at least
     /// max_alpha sum_q |w_q z_q^alpha| / (sqrt(n) max|b|), which is the larger one on slivers.
     pub fn holds<const D: usize>(&self, system: &MomentSystem<T, D>) -> bool {
+        let unscaled = self.residual.terms / T::lift(system.neighbors() as f64).sqrt();
+        self.is_within(system.conditions(), system.largest_required(), unscaled)
+    }
+
+    /// As [`holds`](Self::holds), for l conditions, max|b| and a lower bound on cond(B) max|b|.
+    fn is_within(&self, conditions: usize, largest: T, unscaled: T) -> bool {
         let eps = T::default_epsilon();
-        let unit = eps * T::lift(system.conditions() as f64);
+        let unit = eps * T::lift(conditions as f64);
         let Residual { absolute, terms } = self.residual;
-        let unscaled = terms / T::lift(system.neighbors() as f64).sqrt();
-        absolute <= T::lift(4.0) * unit * (self.condition * system.largest_required()).max(unscaled)
+        absolute <= T::lift(4.0) * unit * (self.condition * largest).max(unscaled)
             && absolute <= T::lift(30.0) * unit * terms
-            && absolute <= eps.sqrt() * system.largest_required()
+            && absolute <= eps.sqrt() * largest
     }
 
     /// Whether it is also as small as QR leaves it, 16 eps max_alpha sum_q |w_q z_q^alpha|: what is asked of the cheaper
-    /// methods before the next is tried. Without l: rounding of a sum grows with its terms, not with their number.
-    pub(super) fn is_sharp<const D: usize>(&self, system: &MomentSystem<T, D>) -> bool {
+    /// methods before the next is tried; for l conditions and max|b|. Without l: rounding of a sum grows with its terms, not with their number.
+    pub(crate) fn is_sharp(&self, conditions: usize, largest: T) -> bool {
         let sharp = T::lift(16.0) * T::default_epsilon() * self.residual.terms;
-        self.holds(system) && self.residual.absolute <= sharp
+        self.is_within(conditions, largest, T::zero()) && self.residual.absolute <= sharp
     }
 }
 

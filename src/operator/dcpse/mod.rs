@@ -173,7 +173,7 @@ impl<Op, const R: u32, S> DcPse<Op, R, S> {
 
     /// Sets what is done about a row that cannot be certified.
     #[must_use]
-    pub fn policy(mut self, fallback: Fallback) -> Self {
+    pub fn fallback(mut self, fallback: Fallback) -> Self {
         self.settings.fallback = fallback;
         self
     }
