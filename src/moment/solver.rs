@@ -44,10 +44,15 @@ pub struct MomentScratch<T> {
     pub(super) a: Vec<T>,
     pub(super) b: Vec<T>,
     pub(super) y: Vec<T>,
+    pub(super) kept: Vec<T>,
 }
 
 /// Finds the weights of a filled [`MomentSystem`].
 pub trait MomentSolver: Clone + Send + Sync + 'static {
+    /// Whether operators try Cholesky on many stencils side by side first, and this method where that gives rows that
+    /// are not sharp.
+    const AFTER_CHOLESKY: bool = false;
+
     /// Writes the weights of output k into `w[k n..(k + 1) n]` and says how good they are.
     ///
     /// # Errors
@@ -59,6 +64,21 @@ pub trait MomentSolver: Clone + Send + Sync + 'static {
         scratch: &mut MomentScratch<T>,
         w: &mut [T],
     ) -> Result<Solution<T>>;
+
+    /// As [`solve`](Self::solve), where Cholesky has left the solution `known`, or none, with its weights in `w`.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    fn climb<T: Scalar, const D: usize>(
+        &self,
+        known: Option<Solution<T>>,
+        system: &MomentSystem<T, D>,
+        scratch: &mut MomentScratch<T>,
+        w: &mut [T],
+    ) -> Result<Solution<T>> {
+        let _ = known;
+        self.solve(system, scratch, w)
+    }
 }
 
 /// max over the outputs of their residuals, NaN being the largest.
@@ -73,17 +93,17 @@ impl<T: Scalar> Solution<T> {
     /// 1/eps the first two say nothing. NaN is not.
     ///
     /// The estimate is of B with its columns scaled. Before that, cond(B) is at least
-    /// max_alpha sum_q |w_q z_q^alpha| / (sqrt(n) max|b|), which is the larger one on slivers.
+    /// max_alpha sum_q |w_q z_q^alpha| / |b| by Cauchy and Schwarz, with |b| <= sqrt(l) max|b|: the larger one on slivers.
     pub fn holds<const D: usize>(&self, system: &MomentSystem<T, D>) -> bool {
-        let unscaled = self.residual.terms / T::lift(system.neighbors() as f64).sqrt();
-        self.is_within(system.conditions(), system.largest_required(), unscaled)
+        self.is_within(system.conditions(), system.largest_required())
     }
 
-    /// As [`holds`](Self::holds), for l conditions, max|b| and a lower bound on cond(B) max|b|.
-    fn is_within(&self, conditions: usize, largest: T, unscaled: T) -> bool {
+    /// As [`holds`](Self::holds), for l conditions and max|b|.
+    pub(crate) fn is_within(&self, conditions: usize, largest: T) -> bool {
         let eps = T::default_epsilon();
         let unit = eps * T::lift(conditions as f64);
         let Residual { absolute, terms } = self.residual;
+        let unscaled = terms / T::lift(conditions as f64).sqrt();
         absolute <= T::lift(4.0) * unit * (self.condition * largest).max(unscaled)
             && absolute <= T::lift(30.0) * unit * terms
             && absolute <= eps.sqrt() * largest
@@ -93,7 +113,7 @@ impl<T: Scalar> Solution<T> {
     /// methods before the next is tried; for l conditions and max|b|. Without l: rounding of a sum grows with its terms, not with their number.
     pub(crate) fn is_sharp(&self, conditions: usize, largest: T) -> bool {
         let sharp = T::lift(16.0) * T::default_epsilon() * self.residual.terms;
-        self.is_within(conditions, largest, T::zero()) && self.residual.absolute <= sharp
+        self.is_within(conditions, largest) && self.residual.absolute <= sharp
     }
 }
 
