@@ -245,7 +245,7 @@ fn widened_lowered_and_empty_rows_pass_through_coefficients_bit_for_bit() -> Fai
     let particles = scattered::<2>(14);
     let n = particles.len();
     for fallback in [Fallback::LowerOrder, Fallback::Empty] {
-        let laplacian = DcPse::<Laplacian<2>, 4>::new().policy(fallback);
+        let laplacian = DcPse::<Laplacian<2>, 4>::new().fallback(fallback);
         let cells = CellList::build(&particles, &Domain::open(), Cutoff(0.36))?;
         let neighbors = Narrow(&cells, 0.29);
         let plain = laplacian.assemble(&neighbors)?;

@@ -12,7 +12,8 @@ use crate::stencil::Stencil;
 /// weight per pair, sum_k c_k(p) w_pq,k.
 ///
 /// v . grad for [`Gradient`](super::Gradient) and a velocity; A : Hessian for [`Hessian`](super::Hessian) and
-/// [`Hessian::packed`](super::Hessian::packed); c Lap for a scalar, K = 1. Exactness, order and signs are those of the
+/// [`Hessian::packed`](super::Hessian::packed); c Lap for a scalar, K = 1; advection and diffusion together for
+/// [`Several`](super::Several). Exactness, order and signs are those of the
 /// method, whose rows are computed and certified as they stand. Where the coefficients are constant, [`Along`](super::Along),
 /// [`AlongTwice`](super::AlongTwice) and [`Times`](super::Times) give the same for fewer solves.
 ///
