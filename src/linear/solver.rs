@@ -52,7 +52,7 @@ impl SparseSolver {
     /// By sparse LU with the feature `faer`, otherwise by GMRES at its defaults.
     ///
     /// # Errors
-    /// As [`lu`](Self::lu) or [`gmres`](Self::gmres).
+    /// As `lu` or [`gmres`](Self::gmres).
     pub fn new(matrix: CsrMatrix) -> Result<Self> {
         #[cfg(feature = "faer")]
         return Self::lu(matrix);
