@@ -1,6 +1,6 @@
 //! The bands an observed order must lie in.
 
-use crate::measure::Observed;
+use crate::measure::{Observed, Series};
 use crate::sets::Set;
 
 /// How far the interior L2 order may be from the design order, for even and for odd r.
@@ -22,7 +22,8 @@ pub fn design(set: Set, order: u32) -> f64 {
 }
 
 /// Which bands are left, each in words.
-pub fn violations(set: Set, dimensions: usize, order: u32, observed: &Observed) -> Vec<String> {
+pub fn violations(series: &Series, dimensions: usize, observed: &Observed) -> Vec<String> {
+    let &Series { set, order, faces, .. } = series;
     let r = f64::from(order);
     let even = order.is_multiple_of(2);
     let mut found = Vec::new();
@@ -42,7 +43,9 @@ pub fn violations(set: Set, dimensions: usize, order: u32, observed: &Observed) 
     if set != Set::Lattice {
         must(linf <= r + if even { ABOVE_EVEN } else { ABOVE_ODD }, "L-inf", linf);
     }
-    must(face >= r - if dimensions < 3 { FACE } else { FACE_3D }, "face", face);
+    if faces {
+        must(face >= r - if dimensions < 3 { FACE } else { FACE_3D }, "face", face);
+    }
     must(observed.above_floor >= ABOVE_FLOOR, "error over floor", observed.above_floor);
     found
 }

@@ -36,6 +36,8 @@ pub struct Series {
     /// Targets taken among particles that may touch a face and among the others, on every set.
     pub targets: usize,
     pub seeds: u64,
+    /// Whether particles whose stencil may touch a face are targets too.
+    pub faces: bool,
 }
 
 /// Norms of the errors on one set, by output.
@@ -65,6 +67,14 @@ impl Sum {
     }
 }
 
+/// Errors and floors of one output, over interior and over face particles.
+#[derive(Clone, Default)]
+struct Sums {
+    errors: [Sum; 2],
+    floors: [Sum; 2],
+    whole: Sum,
+}
+
 /// One output on one set.
 #[derive(Clone, Copy, Default)]
 struct Point {
@@ -72,7 +82,8 @@ struct Point {
     interior: Norms,
     face: Norms,
     whole: Norms,
-    floor: f64,
+    /// Root mean square of the floors of interior and of face rows.
+    floors: [f64; 2],
 }
 
 /// What was observed of one output: medians over the seeds.
@@ -86,7 +97,8 @@ pub struct Observed {
     pub whole: f64,
     /// Interior L2 error on the coarsest and on the finest set.
     pub errors: [f64; 2],
-    /// The smallest error over its round-off floor, eps sum |w| epsilon^-|beta|, of all sets and seeds.
+    /// The smallest L2 error, interior and face, over its round-off floor, eps sum |w| epsilon^-|beta|, of all sets and
+    /// seeds.
     pub above_floor: f64,
 }
 
@@ -126,7 +138,7 @@ pub fn observe<const D: usize, const K: usize, T: Field>(
         let mut points: Vec<[Point; K]> = Vec::new();
         for &side in &series.sides {
             let particles = series.set.particles::<D>(side, seed)?;
-            let (targets, weights) = stratified(&particles, radius, series.targets, seed);
+            let (targets, weights) = stratified(&particles, radius, series, seed);
             let places: Vec<[f64; D]> = targets.iter().map(|&p| particles.points()[p]).collect();
             let h = series.set.spacing::<D>(side, particles.len());
             let target =
@@ -150,8 +162,10 @@ pub fn observe<const D: usize, const K: usize, T: Field>(
             ]
         }));
         for (k, observed) in outcome.outputs.iter_mut().enumerate() {
-            let ratios = points.iter().map(|p| p[k].interior.l2 / p[k].floor);
-            observed.above_floor = ratios.fold(observed.above_floor, f64::min);
+            for p in &points {
+                let ratios = [p[k].interior.l2 / p[k].floors[0], p[k].face.l2 / p[k].floors[1]];
+                observed.above_floor = ratios.into_iter().fold(observed.above_floor, f64::min);
+            }
             observed.errors = [points[0][k].interior.l2, points[points.len() - 1][k].interior.l2];
         }
     }
@@ -180,11 +194,11 @@ impl Observed {
 }
 
 /// Some of the particles farther from every face than the radius of a stencil, and some of the others; and how many
-/// particles each stands for. All where there are no more than `limit`.
+/// particles each stands for. All where there are no more.
 fn stratified<const D: usize>(
     particles: &Particles<D>,
     radius: f64,
-    limit: usize,
+    series: &Series,
     seed: u64,
 ) -> (Vec<usize>, Vec<f64>) {
     let margin = radius * (particles.len() as f64).powf(-1.0 / D as f64);
@@ -192,7 +206,7 @@ fn stratified<const D: usize>(
     let (inner, outer): (Vec<usize>, Vec<usize>) = (0..particles.len()).partition(central);
     let mut random = Random::new(seed ^ 0x5eed);
     let (mut targets, mut weights) = (Vec::new(), Vec::new());
-    for mut stratum in [inner, outer] {
+    for (mut stratum, limit) in [(inner, series.targets), (outer, if series.faces { series.targets } else { 0 })] {
         let count = stratum.len().min(limit);
         weights.resize(weights.len() + count, stratum.len() as f64 / count as f64);
         for i in 0..count {
@@ -235,32 +249,30 @@ impl<const D: usize> Target<'_, D> {
         let rows: Rows<[f64; K], T> = Rows::assemble(dcpse, neighbors)?;
         outcome.grown += rows.report().grown;
         let squares = self.squares(&rows)?;
-        let mut sums: [[Sum; 4]; K] = std::array::from_fn(|_| Default::default());
+        let mut sums: [Sums; K] = std::array::from_fn(|_| Sums::default());
         for (i, &p) in self.targets.iter().enumerate() {
             let cutoff = neighbors.cutoff(i);
             let inside = self.particles.points()[p].iter().all(|x| x - cutoff >= 0.0 && x + cutoff <= 1.0);
             let Some(row) = rows.row(i) else { continue };
             outcome.rows += 1;
             outcome.neighbors += row.sources.len() as f64;
-            for (k, [interior, face, whole, floor]) in sums.iter_mut().enumerate() {
-                whole.add(self.weights[i], squares[i][k]);
-                if !inside {
-                    face.add(self.weights[i], squares[i][k]);
-                    continue;
-                }
-                interior.add(self.weights[i], squares[i][k]);
+            for (k, sum) in sums.iter_mut().enumerate() {
                 let size = |w: &[T]| -> f64 { w[k].abs().as_() };
                 let gain = row.weights.iter().fold(size(row.diagonal.as_ref()), |sum, w| sum + size(w.as_ref()));
                 let epsilon: f64 = T::default_epsilon().as_();
-                floor.add(self.weights[i], (epsilon * gain * self.kappa.powi(-(self.degree as i32))).powi(2));
+                let floor = (epsilon * gain * self.kappa.powi(-(self.degree as i32))).powi(2);
+                let region = usize::from(!inside);
+                sum.errors[region].add(self.weights[i], squares[i][k]);
+                sum.floors[region].add(self.weights[i], floor);
+                sum.whole.add(self.weights[i], squares[i][k]);
             }
         }
-        Ok(sums.map(|[interior, face, whole, floor]| Point {
+        Ok(sums.map(|Sums { errors: [interior, face], floors, whole }| Point {
             h: self.h,
             interior: interior.norms(),
             face: face.norms(),
             whole: whole.norms(),
-            floor: floor.norms().l2,
+            floors: floors.map(|floor| floor.norms().l2),
         }))
     }
 

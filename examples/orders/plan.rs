@@ -25,6 +25,7 @@ impl Series {
             wave: wave(degree, order),
             targets,
             seeds: if set == Set::Lattice { 1 } else { SEEDS },
+            faces: true,
         };
         if set == Set::QuasiRandom {
             let refined = (sides[3] as f64 / sides[0] as f64).powf(1.0 / (QUASI_RANDOM - 1) as f64);
