@@ -335,7 +335,7 @@ fn power_above_root(x: f64) -> f64 {
 /// 1/p of a power of two, from its exponent.
 #[inline(always)]
 fn inverse_power(p: f64) -> f64 {
-    f64::from_bits((2 * BIAS << 52).wrapping_sub(p.to_bits()))
+    f64::from_bits(((2 * BIAS) << 52).wrapping_sub(p.to_bits()))
 }
 
 /// Of the exponents of `f64`.
