@@ -30,3 +30,55 @@ pub(crate) fn square<T: Scalar, const D: usize>(z: &[T; D]) -> T {
     }
     s
 }
+
+/// Figures of a report in files: a number where it is finite, a word where it is not, for formats such as JSON that have
+/// no other way to say so.
+#[cfg(feature = "serde")]
+pub(crate) mod figure {
+    use std::fmt;
+
+    use serde::de::{Deserialize, Deserializer, Error, Visitor};
+    use serde::ser::Serializer;
+
+    pub(crate) fn serialize<S: Serializer>(x: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+        if x.is_finite() || !serializer.is_human_readable() {
+            serializer.serialize_f64(*x)
+        } else {
+            serializer.collect_str(x)
+        }
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+        if deserializer.is_human_readable() {
+            deserializer.deserialize_any(Figure)
+        } else {
+            f64::deserialize(deserializer)
+        }
+    }
+
+    struct Figure;
+
+    impl Visitor<'_> for Figure {
+        type Value = f64;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("a number, or NaN, inf or -inf")
+        }
+
+        fn visit_f64<E: Error>(self, x: f64) -> Result<f64, E> {
+            Ok(x)
+        }
+
+        fn visit_u64<E: Error>(self, x: u64) -> Result<f64, E> {
+            Ok(x as f64)
+        }
+
+        fn visit_i64<E: Error>(self, x: i64) -> Result<f64, E> {
+            Ok(x as f64)
+        }
+
+        fn visit_str<E: Error>(self, word: &str) -> Result<f64, E> {
+            word.parse().map_err(|_| E::invalid_value(serde::de::Unexpected::Str(word), &self))
+        }
+    }
+}

@@ -340,3 +340,166 @@ fn weights_of_every_output_are_seen_through_the_trait() -> Result<()> {
     assert_eq!(entries(&laplacian)?, laplacian.raw().columns.len() + laplacian.targets());
     Ok(())
 }
+
+#[cfg(feature = "serde")]
+mod saved {
+    use super::*;
+    use parops::{ApplyError, Report, RowReport};
+    use serde::{Serialize, de::DeserializeOwned};
+    use serde_json::{Value, json};
+
+    fn reloaded<R: Serialize + DeserializeOwned>(rows: &R) -> R {
+        serde_json::from_str(&serde_json::to_string(rows).unwrap()).unwrap()
+    }
+
+    fn equal_bits<const K: usize, T: Field + Serialize + DeserializeOwned>(rows: &Rows<[f64; K], T>) {
+        let again = reloaded(rows);
+        let (a, b) = (rows.raw(), again.raw());
+        assert_eq!((a.offsets, a.columns), (b.offsets, b.columns));
+        let bits = |w: &[[T; K]]| -> Vec<u64> { w.as_flattened().iter().map(|&w| AsF64::of(w).to_bits()).collect() };
+        assert_eq!(bits(a.weights), bits(b.weights));
+        assert_eq!(bits(a.diagonal), bits(b.diagonal));
+        assert!((0..=rows.targets()).all(|p| rows.center(p) == again.center(p)));
+        assert_eq!((rows.sources(), rows.report()), (again.sources(), again.report()));
+    }
+
+    /// f32 to f64 is exact, the sign of zero included.
+    struct AsF64;
+
+    impl AsF64 {
+        fn of<T: Field>(x: T) -> f64 {
+            x.as_()
+        }
+    }
+
+    #[test]
+    fn reloaded_rows_have_equal_bits() -> Result<()> {
+        let (gradient, laplacian) = torus(12)?;
+        equal_bits(&gradient);
+        equal_bits(&laplacian);
+        small_boxes()?.iter().for_each(equal_bits);
+        let particles = jittered(15, 8)?;
+        let mixed = DcPse::<D2<1, 1>, 2>::new();
+        let cells = CellList::build(&particles, &Domain::open(), mixed.cutoff(&particles)?)?;
+        equal_bits(&Rows::<_, f32>::assemble(&mixed, &cells)?);
+        equal_bits(&Rows::<_, f64>::assemble(&mixed, &cells)?);
+        let off = CellList::build_at(&[[0.4, 0.4], [0.5, 0.6]], &particles, &Domain::open(), Cutoff(0.3))?;
+        equal_bits(&mixed.assemble(&off)?);
+        let nothing = Particles::new(Vec::<[f64; 2]>::new())?;
+        equal_bits(&mixed.assemble(&CellList::build(&nothing, &Domain::open(), Cutoff(0.3))?)?);
+        Ok(())
+    }
+
+    #[test]
+    fn reloaded_rows_are_stale_until_bound_to_as_many_particles() -> Result<()> {
+        let particles = jittered(12, 3)?;
+        let laplacian = DcPse::<Laplacian<2>, 2>::new();
+        let cells = CellList::build(&particles, &Domain::open(), laplacian.cutoff(&particles)?)?;
+        let rows = laplacian.assemble(&cells)?;
+        rows.validate(particles.generation())?;
+        let mut again = reloaded(&rows);
+        let stale = |error: parops::Error| matches!(error.kind(), ErrorKind::Apply(ApplyError::Stale { .. }));
+        assert!(stale(again.validate(particles.generation()).unwrap_err()));
+        let error = again.bind(&jittered(11, 3)?).unwrap_err();
+        assert!(matches!(error.kind(), ErrorKind::Particle(parops::ParticleError::Length { found: 121, needed: 144 })));
+        again.bind(&particles)?;
+        again.validate(particles.generation())?;
+        assert_eq!(again, rows);
+        again.bind(&particles)?;
+        // Rows that know their particles do not change them.
+        let other = jittered(12, 4)?;
+        assert!(
+            stale(again.bind(&other).unwrap_err()) && stale(reloaded(&rows).validate(other.generation()).unwrap_err())
+        );
+        Ok(())
+    }
+
+    #[test]
+    fn tampered_rows_are_refused() -> Result<()> {
+        let particles = jittered(12, 3)?;
+        let gradient = DcPse::<Gradient<2>, 2>::new();
+        let targets = [[0.5, 0.5], [0.3, 0.6], [0.45, 0.2]];
+        let domain = Domain::open();
+        let near = CellList::build_at(&targets, &particles, &domain, Cutoff(0.35))?;
+        let off = serde_json::to_value(gradient.assemble(&near)?).unwrap();
+        let cells = CellList::build(&particles, &domain, gradient.cutoff(&particles)?)?;
+        let on = serde_json::to_value(gradient.assemble(&cells)?).unwrap();
+        let pairs = on["columns"].as_array().unwrap().len();
+        type Change<'a> = &'a dyn Fn(&mut Value);
+        let changes: [(&str, &Value, Change); 19] = [
+            ("must be", &on, &|rows| rows["offsets"][3] = json!(0)),
+            ("must be", &on, &|rows| rows["offsets"][0] = json!(1)),
+            ("must be", &on, &|rows| rows["offsets"][144] = json!(pairs - 1)),
+            ("must be", &on, &|rows| rows["offsets"][100] = json!(u64::MAX)),
+            ("needed", &on, &|rows| rows["offsets"] = json!([])),
+            ("does not exist", &on, &|rows| rows["columns"][17] = json!(144)),
+            ("must be", &on, &|rows| drop(rows["columns"].as_array_mut().unwrap().pop())),
+            ("needed", &on, &|rows| drop(rows["weights"].as_array_mut().unwrap().pop())),
+            ("needed", &on, &|rows| drop(rows["diagonal"].as_array_mut().unwrap().pop())),
+            ("null", &on, &|rows| rows["weights"][5] = Value::Null),
+            ("expected f64", &on, &|rows| rows["weights"][5] = json!("NaN")),
+            ("does not exist", &on, &|rows| rows["sources"] = json!(143)),
+            ("more than", &on, &|rows| rows["sources"] = json!(u64::MAX)),
+            ("needed", &on, &|rows| rows["outputs"] = json!(3)),
+            ("missing field", &on, &|rows| drop(rows.as_object_mut().unwrap().remove("report"))),
+            ("unknown field", &on, &|rows| rows["more"] = json!(1)),
+            ("needed", &off, &|rows| drop(rows["centers"].as_array_mut().unwrap().pop())),
+            ("does not exist", &off, &|rows| rows["centers"][1] = json!(144)),
+            ("needed", &on, &|rows| drop(rows["report"]["sums"].as_array_mut().unwrap().pop())),
+        ];
+        for (i, (reason, rows, change)) in changes.into_iter().enumerate() {
+            let mut rows = rows.clone();
+            assert!(serde_json::from_value::<Rows<[f64; 2]>>(rows.clone()).is_ok());
+            change(&mut rows);
+            let error = serde_json::from_value::<Rows<[f64; 2]>>(rows).unwrap_err().to_string();
+            assert!(error.contains(reason), "change {i}: {error}");
+        }
+        // A number that f64 holds and f32 does not.
+        let mut large = on.clone();
+        large["weights"][3] = json!(1e300);
+        assert!(serde_json::from_value::<Rows<[f64; 2]>>(large.clone()).is_ok());
+        let error = serde_json::from_value::<Rows<[f64; 2], f32>>(large).unwrap_err().to_string();
+        assert!(error.contains("weight of neighbor"), "{error}");
+        Ok(())
+    }
+
+    /// A method that knows nothing of its rows and says so.
+    struct Unknowing;
+
+    impl parops::Method<1> for Unknowing {
+        type Out = [f64; 1];
+        type Scratch = ();
+
+        fn scratch(&self) -> Result<()> {
+            Ok(())
+        }
+
+        fn weights(&self, _: &parops::Stencil<1>, _: &mut (), w: &mut [[f64; 1]], d: &mut [f64; 1]) -> Result<()> {
+            w.fill([1.0]);
+            *d = [0.0];
+            Ok(())
+        }
+
+        fn report(&self, row: &parops::Stencil<1>, _: &(), w: &[[f64; 1]], d: &[f64; 1]) -> Result<RowReport> {
+            let mut report = RowReport::of(row, w, d);
+            (report.moment_defect, report.condition, report.residual) = (f64::NAN, f64::INFINITY, 1.0);
+            Ok(report)
+        }
+    }
+
+    #[test]
+    fn figures_that_are_not_finite_survive_a_file() -> Result<()> {
+        let particles = Particles::lattice([0.0], [1.0], [4])?;
+        let rows = Rows::<_, f64>::assemble(&Unknowing, &CellList::build(&particles, &Domain::open(), Cutoff(0.3))?)?;
+        let report: Report = reloaded(rows.report());
+        assert!(report.moment_defect.is_nan() && rows.report().moment_defect.is_nan());
+        assert_eq!((report.condition, report.residual), (f64::INFINITY, 1.0));
+        let (row, worst): (RowReport, _) = (reloaded(report.worst().unwrap()), rows.report().worst().unwrap());
+        assert!(row.moment_defect.is_nan());
+        assert_eq!((row.condition, row.target, row.sum_abs), (f64::INFINITY, worst.target, worst.sum_abs));
+        assert!(
+            serde_json::from_str::<RowReport>(&serde_json::to_string(&row).unwrap().replace("inf", "much")).is_err()
+        );
+        Ok(())
+    }
+}

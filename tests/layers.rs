@@ -5,7 +5,7 @@ use std::{env, fs};
 
 /// The layers in order; the modules of one entry may use each other.
 const LAYERS: &[&[&str]] = &[
-    &["scalar", "stencil", "scale", "error"],
+    &["scalar", "lanes", "exp", "stencil", "scale", "error"],
     &["multi_index"],
     &["kernel"],
     &["moment"],

@@ -3,7 +3,10 @@
 use std::env;
 
 use nalgebra::{DMatrix, DVector};
-use parops::{Apply, ApplyError, CsrMatrix, Error, ErrorKind, Gmres, Ilu0, LinearError, Random, Result, SparseSolver};
+use parops::{
+    Apply, ApplyError, CellList, CsrMatrix, DcPse, Domain, Error, ErrorKind, Gmres, Ilu0, Laplacian, LinearError,
+    Particles, Random, Result, SparseSolver,
+};
 use proptest::prelude::*;
 
 const EPS: f64 = f64::EPSILON;
@@ -453,6 +456,41 @@ fn solver_refuses_what_it_cannot_solve() -> Result<()> {
     let error = slow.solve(&[1.0; 400], &mut [0.0; 400]).unwrap_err();
     assert!(matches!(linear(error), LinearError::NotConverged { iterations: 3, residual, .. } if residual > 1e-3));
     assert!(matches!(linear(slow.condition().unwrap_err()), LinearError::NotConverged { .. }));
+    Ok(())
+}
+
+#[test]
+fn solver_recovers_a_cubic_from_dcpse_rows_and_dirichlet_rows() -> Result<()> {
+    const M: usize = 24;
+    let (h, m) = (1.0 / (M - 1) as f64, M);
+    let mut random = Random::new(31);
+    let points = (0..m * m).map(|p| {
+        [p / m, p % m].map(|i| {
+            let jitter = if i == 0 || i == m - 1 { 0.0 } else { 0.2 * (random.uniform() - 0.5) };
+            (i as f64 + jitter) * h
+        })
+    });
+    let particles = Particles::new(points.collect())?;
+    let laplacian = DcPse::<Laplacian<2>, 2>::new();
+    let cells = CellList::build(&particles, &Domain::open(), laplacian.cutoff(&particles)?)?;
+    let mut matrix = laplacian.assemble(&cells)?.to_csr(0)?;
+    let walls = |p: &usize| [p / m, p % m].iter().any(|&i| i == 0 || i == m - 1);
+    matrix.replace_rows(&CsrMatrix::identity(m * m)?, (0..m * m).filter(walls).map(|p| (p, p)))?;
+
+    // Order 2 reproduces cubics, so only rounding is left: of the weights, and of the solve.
+    let cubic = |[x, y]: [f64; 2]| x * x * x - 2.0 * x * y * y + y * y - x + 0.5;
+    let source = |[x, _]: [f64; 2]| 6.0 * x - 4.0 * x + 2.0;
+    let right = |(p, x): (usize, &[f64; 2])| if walls(&p) { cubic(*x) } else { source(*x) };
+    let b: Vec<f64> = particles.points().iter().enumerate().map(right).collect();
+    let exact = condition(&matrix);
+    for mut solver in solvers(&matrix)? {
+        let mut u = vec![0.0; m * m];
+        let report = solver.solve(&b, &mut u)?;
+        let error = u.iter().zip(particles.points()).fold(0.0_f64, |worst, (u, x)| worst.max((u - cubic(*x)).abs()));
+        let estimate = solver.condition()?;
+        assert!((0.3 * exact..=exact * (1.0 + 1e-7)).contains(&estimate), "{estimate} {exact}");
+        assert!(error <= 1e-13 * exact, "{error:e} {exact:e} {report:?}");
+    }
     Ok(())
 }
 

@@ -171,6 +171,27 @@ fn applying_stored_rows_allocates_nothing_and_matrix_free_nothing_after_the_firs
 
 #[cfg(not(feature = "rayon"))]
 #[test]
+fn solves_after_the_first_allocate_nothing() -> parops::Result<()> {
+    let (n, chain) = (300, |i: usize| [(i, i, 4.0), (i, (i + 1) % 300, -1.0), (i, (i + 17) % 300, -2.0)]);
+    let matrix = parops::CsrMatrix::from_triplets(n, n, (0..n).flat_map(chain))?;
+    let factors = parops::Ilu0::new(&matrix)?;
+    let mut gmres = parops::Gmres::new().restart(4);
+    let mut solvers = vec![parops::SparseSolver::gmres(matrix.clone(), gmres.clone())?];
+    #[cfg(feature = "faer")]
+    solvers.push(parops::SparseSolver::lu(matrix.clone())?);
+    let mut x = vec![0.0; n];
+    let (easy, hard): (Vec<f64>, Vec<f64>) = (0..n).map(|i| (1.0, (i as f64).sin())).unzip();
+    gmres.solve(&matrix, Some(&factors), &easy, &mut x)?;
+    assert_eq!(allocations(|| assert!(gmres.solve(&matrix, Some(&factors), &hard, &mut x).unwrap().iterations > 4)), 0);
+    for mut solver in solvers {
+        solver.solve(&easy, &mut x)?;
+        assert_eq!(allocations(|| assert!(solver.solve(&hard, &mut x).is_ok())), 0);
+    }
+    Ok(())
+}
+
+#[cfg(not(feature = "rayon"))]
+#[test]
 fn imposing_boundary_conditions_allocates_nothing_after_the_first_time() {
     let lattice = Particles::lattice([0.0; 2], [1.0; 2], [16; 2]).unwrap();
     let neighbors = CellList::build(&lattice, &Domain::open(), parops::Cutoff(0.5)).unwrap();

@@ -3,6 +3,7 @@
 use std::error::Error;
 use std::path::Path;
 
+use parops::Histogram;
 use plotters::prelude::*;
 
 use crate::figure::{Axes, Curve, Mark, draw};
@@ -64,6 +65,34 @@ fn curves(records: &[Record], set: &'static str, x: impl Fn(&Record) -> f64, y: 
     curves
 }
 
+/// Share of the rows per decade of condition number and residual, for the Laplacian on the finest jittered set.
+pub fn certificates(path: &Path, records: &[Record]) -> Drawn {
+    let panel = |title, x, spread: fn(&Record) -> &Histogram| {
+        let finest = finest(records).into_iter().filter(|r| (r.set, r.operator) == ("jittered", "laplacian"));
+        let curve = |r: &Record| {
+            // The middle of a decade, on a logarithmic axis.
+            let share = |(low, rows): (f64, usize)| (low * 10.0_f64.sqrt(), rows as f64 / r.particles as f64);
+            let points = spread(r).decades().filter(|&(low, _)| low >= LOWEST).map(share).collect();
+            let mark = if r.dim == 2 { Mark::Circles } else { Mark::Triangles };
+            let color = r.order as usize / 2 - 1 + if r.dim == 3 { 3 } else { 0 };
+            Curve { name: format!("{}D, r = {}", r.dim, r.order), points, mark, color }
+        };
+        (Axes { title, x, y: "share of the rows per decade", logarithmic: true }, finest.map(curve).collect())
+    };
+    let condition = panel("Condition numbers, finest jittered set", "cond(B), estimated", |r| &r.condition_spread);
+    let residual = panel("Residuals, finest jittered set", "largest miss, scaled units", |r| &r.residual_spread);
+    draw(path, &[condition, residual])
+}
+
+/// Residuals below are those of rows that miss nothing at all.
+const LOWEST: f64 = 1e-20;
+
+/// The finest set of every series.
+fn finest(records: &[Record]) -> Vec<&Record> {
+    let last = |&(i, r): &(usize, &Record)| records.get(i + 1).is_none_or(|next| next.key() != r.key());
+    records.iter().enumerate().filter(last).map(|(_, r)| r).collect()
+}
+
 const NAMES: [&str; 5] = ["LU", "Cholesky", "Cholesky, corrected", "QR", "pivoted QR"];
 const COLORS: [RGBColor; 5] = [
     RGBColor(130, 130, 130),
@@ -75,14 +104,8 @@ const COLORS: [RGBColor; 5] = [
 
 /// Share of the rows each solver found, for the finest set of every series.
 pub fn rungs(path: &Path, records: &[Record]) -> Drawn {
-    let finest: Vec<&Record> = records
-        .iter()
-        .enumerate()
-        .filter(|(i, r)| records.get(i + 1).is_none_or(|n| n.key() != r.key()))
-        .map(|(_, r)| r)
-        .collect();
     let mut svg = String::new();
-    bars(&mut svg, &finest).map_err(|error| error.to_string())?;
+    bars(&mut svg, &finest(records)).map_err(|error| error.to_string())?;
     std::fs::write(path, svg)?;
     Ok(())
 }

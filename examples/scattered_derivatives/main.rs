@@ -1,7 +1,7 @@
 //! Derivatives on scattered particles by DC-PSE: gradient, Laplacian and a mixed third derivative (D^(2,1) in 2D,
 //! D^(1,1,1) in 3D) of order 2, 4 and 6 in 2D and 3D, on a jittered and a clustered set, refined four times; and a few
 //! degenerate sets, whose rows are refused. Prints a table, writes `scattered_derivatives.csv` and figures (error
-//! against h, error against run time, solvers per row), and exits with 1 when a claim does not hold.
+//! against h, error against run time, solvers per row, certificates per decade), and exits with 1 when a claim does not hold.
 //!
 //! Every particle uses its 2 l nearest neighbors. Errors are relative; those of the CSV and of the observed order are
 //! over interior particles, whose cutoff touches no face of the box; the others have a column of the printed table.
@@ -90,6 +90,7 @@ fn study(options: &Options) -> Result<bool, Box<dyn Error>> {
     figures::errors(&options.out.join("scattered_derivatives_error.svg"), &records)?;
     figures::cost(&options.out.join("scattered_derivatives_cost.svg"), &records)?;
     figures::rungs(&options.out.join("scattered_derivatives_rungs.svg"), &records)?;
+    figures::certificates(&options.out.join("scattered_derivatives_certificates.svg"), &records)?;
     println!("written to {} after {:.1} s\n", options.out.display(), start.elapsed().as_secs_f64());
 
     let claims = claims::check(&records, &degenerate);

@@ -3,7 +3,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use parops::{DcPse, Domain, MultiIndex, Nearest, Neighbors, Operator, Particles, Report};
+use parops::{DcPse, Domain, Histogram, MultiIndex, Nearest, Neighbors, Operator, Particles, Report};
 
 use crate::field::{derivative, exact};
 use crate::sets::Set;
@@ -38,6 +38,9 @@ pub struct Record {
     pub condition: f64,
     pub residual: f64,
     pub rungs: [usize; 5],
+    /// Rows per decade.
+    pub condition_spread: Histogram,
+    pub residual_spread: Histogram,
 }
 
 /// Builds are repeated until they have taken this long together, three times at most; the fastest counts.
@@ -125,6 +128,8 @@ where
         condition: report.condition,
         residual: report.residual,
         rungs: report.rungs,
+        condition_spread: report.conditions,
+        residual_spread: report.residuals,
     })
 }
 

@@ -13,6 +13,8 @@
 /// assert_eq!(rows.decades().nth(1), Some((1e-16, 2)));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(into = "Vec<usize>", try_from = "Vec<usize>"))]
 pub struct Histogram {
     counts: [usize; BINS],
 }
@@ -24,6 +26,24 @@ const LOWEST: i32 = -32;
 impl Default for Histogram {
     fn default() -> Self {
         Self { counts: [0; BINS] }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl From<Histogram> for Vec<usize> {
+    fn from(histogram: Histogram) -> Self {
+        histogram.counts.to_vec()
+    }
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Vec<usize>> for Histogram {
+    type Error = crate::error::Error;
+
+    fn try_from(counts: Vec<usize>) -> crate::error::Result<Self> {
+        let found = counts.len();
+        let wrong = |_| crate::error::ParticleError::Length { found, needed: BINS };
+        Ok(Self { counts: counts.try_into().map_err(wrong)? })
     }
 }
 

@@ -9,6 +9,8 @@ mod histogram;
 mod matrix_free;
 mod report;
 mod rows;
+#[cfg(feature = "serde")]
+mod saved;
 mod splice;
 mod strided;
 mod sweep;

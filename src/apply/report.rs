@@ -11,6 +11,7 @@ const WORST: usize = 8;
 ///
 /// Being in the rows themselves, it costs nothing to ask again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Report {
     /// Number of rows.
@@ -22,23 +23,30 @@ pub struct Report {
     /// Most neighbors of a row.
     pub most: usize,
     /// Largest h/epsilon.
+    #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub h_over_epsilon: f64,
     /// Largest relative defect of the discrete moments.
+    #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub moment_defect: f64,
     /// Largest moment below the degree of the operator, see [`RowReport::lower_moment`]: where it is not zero, the
     /// error of PSE and SPH grows under refinement.
+    #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub lower_moment: f64,
     /// Largest sum of absolute weights.
+    #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub sum_abs: f64,
     /// Negative pair weights, summed over all rows.
     pub negative_weights: usize,
     /// Bound on the modulus of the eigenvalues of the operator: the largest over the rows.
+    #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub spectral_bound: f64,
     /// Rows that break a limit with the caller's leave.
     pub allowed: usize,
     /// Largest estimated condition number of a moment system; 0 where none was solved.
+    #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub condition: f64,
     /// Largest miss of a moment condition, in scaled units.
+    #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub residual: f64,
     /// Rows per solver, in the order of [`Rung`](crate::Rung).
     pub rungs: [usize; 5],
@@ -50,6 +58,10 @@ pub struct Report {
     pub lowered: usize,
     /// Rows left without weights.
     pub empty: usize,
+    /// Largest contrast of the diffusivities in a stencil, see [`RowReport::contrast`].
+    pub contrast: f64,
+    /// Rows in which modes may grow, see [`RowReport::growing`].
+    pub growing: usize,
     /// Rows per decade of the condition number.
     pub conditions: Histogram,
     /// Rows per decade of the residual.
@@ -96,6 +108,8 @@ impl Report {
         self.grown += usize::from(row.grown > 0);
         self.lowered += usize::from(row.lowered > 0);
         self.empty += usize::from(row.empty);
+        self.contrast = self.contrast.max(row.contrast);
+        self.growing += usize::from(row.growing);
         self.rank(row);
     }
 
@@ -123,6 +137,8 @@ impl Report {
         self.grown += next.grown;
         self.lowered += next.lowered;
         self.empty += next.empty;
+        self.contrast = self.contrast.max(next.contrast);
+        self.growing += next.growing;
         next.worst_rows().for_each(|row| self.rank(row));
     }
 

@@ -43,7 +43,7 @@ fn share(w: &[[f64; 1]], diagonal: &[f64; 1]) -> f64 {
 
 impl<M: Method<D, Out = [f64; D]>, const D: usize> Method<D> for Outward<M, D> {
     type Out = [f64; 1];
-    type Scratch = ContractionScratch<M::Scratch, D>;
+    type Scratch = ContractionScratch<M::Scratch, D, D>;
 
     fn scratch(&self) -> Result<Self::Scratch> {
         self.normal.scratch()

@@ -47,7 +47,7 @@ impl MomentSolver for Cholesky {
             y.resize(n, T::zero());
             accumulate(system, b, y);
             let mut row = Solution { residual: system.residual(k, y), ..solution };
-            if !row.is_sharp(system) {
+            if !row.is_sharp(system.conditions(), system.largest_required()) {
                 system.defect(k, y, b);
                 solve(matrix, l, b);
                 accumulate(system, b, y);

@@ -1,14 +1,19 @@
 //! Moments: of kernels, over particles, and the systems that correct a kernel to its discrete moments.
 
+mod batch;
 mod cholesky;
 mod integral;
 mod ladder;
 mod lu;
+mod monomials;
+mod nodes;
 mod qr;
 mod solver;
 mod system;
+mod triangle;
 mod window;
 
+pub(crate) use batch::{BatchScratch, BatchSystem};
 pub use cholesky::Cholesky;
 pub use integral::{
     CenterTerm, Quadrature, continuous_moment, continuous_moments, discrete_moment, discrete_moments,

@@ -43,7 +43,7 @@ fn solve<T: Scalar, const D: usize>(
     pivot: bool,
 ) -> Result<Solution<T>> {
     let (n, l) = (system.neighbors(), system.conditions());
-    let MomentScratch { matrix, diagonal, factors, order, a, b, y } = scratch;
+    let MomentScratch { matrix, diagonal, factors, order, a, b, y, .. } = scratch;
     matrix.clear();
     matrix.extend_from_slice(system.columns());
     let rank = factorize(matrix, n, l, diagonal, factors, order, pivot);

@@ -6,6 +6,7 @@ use crate::scalar::Scalar;
 
 /// Which method found the weights of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Rung {
     /// LU of A = B^T B, as in the notes.
@@ -43,10 +44,15 @@ pub struct MomentScratch<T> {
     pub(super) a: Vec<T>,
     pub(super) b: Vec<T>,
     pub(super) y: Vec<T>,
+    pub(super) kept: Vec<T>,
 }
 
 /// Finds the weights of a filled [`MomentSystem`].
 pub trait MomentSolver: Clone + Send + Sync + 'static {
+    /// Whether operators try Cholesky on many stencils side by side first, and this method where that gives rows that
+    /// are not sharp.
+    const AFTER_CHOLESKY: bool = false;
+
     /// Writes the weights of output k into `w[k n..(k + 1) n]` and says how good they are.
     ///
     /// # Errors
@@ -58,6 +64,21 @@ pub trait MomentSolver: Clone + Send + Sync + 'static {
         scratch: &mut MomentScratch<T>,
         w: &mut [T],
     ) -> Result<Solution<T>>;
+
+    /// As [`solve`](Self::solve), where Cholesky has left the solution `known`, or none, with its weights in `w`.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    fn climb<T: Scalar, const D: usize>(
+        &self,
+        known: Option<Solution<T>>,
+        system: &MomentSystem<T, D>,
+        scratch: &mut MomentScratch<T>,
+        w: &mut [T],
+    ) -> Result<Solution<T>> {
+        let _ = known;
+        self.solve(system, scratch, w)
+    }
 }
 
 /// max over the outputs of their residuals, NaN being the largest.
@@ -70,20 +91,29 @@ impl<T: Scalar> Solution<T> {
     /// Whether the residual is rounding and nothing else: at most 4 l eps cond(B) max|b|, at most
     /// 30 l eps max_alpha sum_q |w_q z_q^alpha|, and at most sqrt(eps) max|b|, because where condition or weights reach
     /// 1/eps the first two say nothing. NaN is not.
+    ///
+    /// The estimate is of B with its columns scaled. Before that, cond(B) is at least
+    /// max_alpha sum_q |w_q z_q^alpha| / |b| by Cauchy and Schwarz, with |b| <= sqrt(l) max|b|: the larger one on slivers.
     pub fn holds<const D: usize>(&self, system: &MomentSystem<T, D>) -> bool {
+        self.is_within(system.conditions(), system.largest_required())
+    }
+
+    /// As [`holds`](Self::holds), for l conditions and max|b|.
+    pub(crate) fn is_within(&self, conditions: usize, largest: T) -> bool {
         let eps = T::default_epsilon();
-        let unit = eps * T::lift(system.conditions() as f64);
+        let unit = eps * T::lift(conditions as f64);
         let Residual { absolute, terms } = self.residual;
-        absolute <= T::lift(4.0) * unit * self.condition * system.largest_required()
+        let unscaled = terms / T::lift(conditions as f64).sqrt();
+        absolute <= T::lift(4.0) * unit * (self.condition * largest).max(unscaled)
             && absolute <= T::lift(30.0) * unit * terms
-            && absolute <= eps.sqrt() * system.largest_required()
+            && absolute <= eps.sqrt() * largest
     }
 
     /// Whether it is also as small as QR leaves it, 16 eps max_alpha sum_q |w_q z_q^alpha|: what is asked of the cheaper
-    /// methods before the next is tried. Without l: rounding of a sum grows with its terms, not with their number.
-    pub(super) fn is_sharp<const D: usize>(&self, system: &MomentSystem<T, D>) -> bool {
+    /// methods before the next is tried; for l conditions and max|b|. Without l: rounding of a sum grows with its terms, not with their number.
+    pub(crate) fn is_sharp(&self, conditions: usize, largest: T) -> bool {
         let sharp = T::lift(16.0) * T::default_epsilon() * self.residual.terms;
-        self.holds(system) && self.residual.absolute <= sharp
+        self.is_within(conditions, largest) && self.residual.absolute <= sharp
     }
 }
 

@@ -75,6 +75,11 @@ impl<T: Scalar, const D: usize> MomentSystem<T, D> {
         self.basis.len()
     }
 
+    /// The multi-indices of the conditions, in graded order.
+    pub(super) fn basis(&self) -> &[MultiIndex<D>] {
+        &self.basis
+    }
+
     /// Number of neighbors n of the stencil it was filled with.
     pub fn neighbors(&self) -> usize {
         self.n

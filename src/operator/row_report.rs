@@ -7,6 +7,7 @@ use crate::stencil::Stencil;
 
 /// What is known about one row.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct RowReport {
     /// The target.
@@ -14,19 +15,24 @@ pub struct RowReport {
     /// Number of neighbors n.
     pub neighbors: usize,
     /// h/epsilon, with h = V^(1/D).
+    #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub h_over_epsilon: f64,
     /// Relative defect of the discrete moments that are checked.
+    #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub moment_defect: f64,
     /// The largest moment M_alpha with 0 < |alpha| < m, relative to the required ones: zero on lattices, and not
     /// checked. It adds M_alpha D^alpha f / epsilon^(m - |alpha|) to the result, which grows under refinement.
+    #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub lower_moment: f64,
     /// Number of moment conditions l that were solved for; 0 where none were.
     pub conditions: usize,
     /// Their rank on this stencil.
     pub rank: usize,
     /// Estimated condition number of the windowed, scaled monomials; 0 where no system was solved.
+    #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub condition: f64,
     /// The largest miss of a moment condition, in scaled units.
+    #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub residual: f64,
     /// Which solver found the weights.
     pub rung: Option<Rung>,
@@ -39,11 +45,19 @@ pub struct RowReport {
     /// Whether the row was left without weights because none could be certified.
     pub empty: bool,
     /// |d_p| + sum_q |w_pq|, the largest over the outputs: the gain of noise, in units of the operator.
+    #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub sum_abs: f64,
     /// Pairs whose weight is negative before the sign of an image; for a Laplacian each costs the maximum principle.
     pub negative_weights: usize,
     /// The bound this row sets on the modulus of the eigenvalues of the operator, in units of the operator.
+    #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub spectral_bound: f64,
+    /// Largest over smallest diffusivity of the stencil, see [`DivGrad`](crate::DivGrad); 1 where there is none, infinite
+    /// beside an insulator.
+    pub contrast: f64,
+    /// Whether modes may grow: [`Mean::Arithmetic`](crate::Mean) across a contrast above 10, at an order above 2 and with
+    /// weights of both signs.
+    pub growing: bool,
     /// The limit this row breaks, if any.
     pub breach: Option<Breach>,
     /// Whether the caller allowed this row to break it.
@@ -76,6 +90,8 @@ impl RowReport {
             sum_abs,
             negative_weights: 0,
             spectral_bound: 2.0 * sum_abs,
+            contrast: 1.0,
+            growing: false,
             breach: None,
             allowed: false,
         }
@@ -89,20 +105,25 @@ impl RowReport {
 
 /// A limit that a row breaks.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Breach {
     /// h/epsilon is above what the kernel bears.
     Overlap {
         /// h/epsilon.
+        #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
         h_over_epsilon: f64,
         /// The largest legal value.
+        #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
         limit: f64,
     },
     /// The discrete moments miss their conditions.
     Moment {
         /// The relative defect.
+        #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
         defect: f64,
         /// The largest legal value.
+        #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
         limit: f64,
     },
 }

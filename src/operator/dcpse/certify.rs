@@ -1,9 +1,9 @@
 //! The moment systems of several targets, solved side by side and held to their gates.
 
 use super::Settings;
-use super::group::{Group, Pairing};
+use super::group::{Conditions, Group, Pairing};
 use crate::error::{Error, OperatorError, Result};
-use crate::moment::{MomentScratch, MomentSolver, Rung, Solution};
+use crate::moment::{BatchScratch, MomentScratch, MomentSolver, Rung, Solution};
 use crate::operator::method::spread;
 use crate::stencil::Stencil;
 
@@ -12,13 +12,14 @@ use crate::stencil::Stencil;
 pub(super) struct Room<const D: usize, const L: usize> {
     z: [Vec<[f64; D]>; L],
     w: [Vec<f64>; L],
+    batch: BatchScratch<L>,
     moments: MomentScratch<f64>,
 }
 
 impl<const D: usize, const L: usize> Default for Room<D, L> {
     fn default() -> Self {
         let (z, w) = (std::array::from_fn(|_| Vec::new()), std::array::from_fn(|_| Vec::new()));
-        Self { z, w, moments: MomentScratch::default() }
+        Self { z, w, batch: BatchScratch::default(), moments: MomentScratch::default() }
     }
 }
 
@@ -58,47 +59,57 @@ pub(super) fn certify<S: MomentSolver, const D: usize, const K: usize, const L: 
     });
     let particle = jobs.iter().all(|job| job.row.center().is_some());
     for group in groups {
-        let (outputs, conditions) = (group.outputs.len(), group.at(particle).0.conditions());
+        let (outputs, conditions, pairing) = group.at(particle);
+        let Conditions { system, batch } = conditions;
+        let (conditions, largest) = (system.conditions(), system.largest_required());
         for i in 0..L {
             room.z[i].clear();
-            if let Ok(certificate) = &mut found[i] {
-                match nodes(settings, group.at(particle), jobs[i].row, scales[i].0, &mut room.z[i]) {
-                    Ok(()) => certificate.conditions = certificate.conditions.max(conditions),
-                    Err(error) => found[i] = Err(error),
-                }
+            if found[i].is_ok()
+                && let Err(error) = nodes(settings, conditions, pairing, jobs[i].row, scales[i].0, &mut room.z[i])
+            {
+                found[i] = Err(error);
             }
             room.w[i].clear();
-            room.w[i].resize(room.z[i].len() * outputs, 0.0);
+            room.w[i].resize(room.z[i].len() * outputs.len(), 0.0);
         }
-        for i in 0..L {
-            let Ok(certificate) = &mut found[i] else { continue };
+        let mut known = [None; L];
+        if S::AFTER_CHOLESKY {
+            let z = room.z.each_ref().map(Vec::as_slice);
+            let w = room.w.each_mut().map(Vec::as_mut_slice);
+            known = batch.solve(z, settings.window, scales.map(|(_, ratio)| ratio), &mut room.batch, w);
+        }
+        let mut finish = |i: usize, certificate: &mut Certificate| {
             let (inverse, ratio) = scales[i];
-            let (system, pairing) = group.at(particle);
-            system.fill(&room.z[i], settings.window, ratio);
-            let solution = match solver.solve(system, &mut room.moments, &mut room.w[i]) {
-                Ok(solution) if solution.holds(system) => solution,
-                Ok(Solution { rank, condition, residual, .. }) => {
-                    let (neighbors, residual) = (jobs[i].row.len(), residual.absolute);
-                    let kind = OperatorError::Uncertified { neighbors, conditions, rank, condition, residual, ratio };
-                    found[i] = Err(Error::from(kind));
-                    continue;
-                }
-                Err(error) => {
-                    found[i] = Err(error);
-                    continue;
+            let (z, w) = (&room.z[i], &mut room.w[i]);
+            let solution = match known[i].filter(|known| known.is_sharp(conditions, largest)) {
+                Some(known) => known,
+                None => {
+                    system.fill(z, settings.window, ratio);
+                    solver.climb(known[i], system, &mut room.moments, w)?
                 }
             };
-            certificate.rank = certificate.rank.max(solution.rank);
-            certificate.condition = certificate.condition.max(solution.condition);
-            certificate.residual = certificate.residual.max(solution.residual.absolute);
-            certificate.rung = certificate.rung.max(Some(solution.rung));
-            certificate.negative += room.w[i].iter().filter(|&&w| w < 0.0).count();
-            let nodes = room.z[i].len();
-            for (&(k, degree), column) in group.outputs.iter().zip(room.w[i].chunks_exact(nodes)) {
-                if let Err(error) = hand_out(k, column, degree, inverse, pairing, &mut jobs[i]) {
-                    found[i] = Err(error);
-                    break;
-                }
+            let Solution { rung, rank, condition, residual } = solution;
+            if !solution.is_within(conditions, largest) {
+                let (neighbors, residual) = (jobs[i].row.len(), residual.absolute);
+                let kind = OperatorError::Uncertified { neighbors, conditions, rank, condition, residual, ratio };
+                return Err(Error::from(kind));
+            }
+            certificate.conditions = certificate.conditions.max(conditions);
+            certificate.rank = certificate.rank.max(rank);
+            certificate.condition = certificate.condition.max(condition);
+            certificate.residual = certificate.residual.max(residual.absolute);
+            certificate.rung = certificate.rung.max(Some(rung));
+            certificate.negative += w.iter().filter(|&&w| w < 0.0).count();
+            for (&(k, degree), column) in outputs.iter().zip(w.chunks_exact(z.len())) {
+                hand_out(k, column, degree, inverse, pairing, &mut jobs[i])?;
+            }
+            Ok(())
+        };
+        for (i, found) in found.iter_mut().enumerate() {
+            if let Ok(certificate) = found
+                && let Err(error) = finish(i, certificate)
+            {
+                *found = Err(error);
             }
         }
     }
@@ -109,13 +120,14 @@ pub(super) fn certify<S: MomentSolver, const D: usize, const K: usize, const L: 
 /// particle itself (errata 21).
 fn nodes<const D: usize>(
     settings: &Settings,
-    (system, pairing): (&mut crate::moment::MomentSystem<f64, D>, Pairing),
+    conditions: usize,
+    pairing: Pairing,
     row: &Stencil<D>,
     inverse: f64,
     z: &mut Vec<[f64; D]>,
 ) -> Result<()> {
     let neighbors = row.len() + usize::from(pairing == Pairing::Sum);
-    let (conditions, needed) = (system.conditions(), settings.fewest(system.conditions()));
+    let needed = settings.fewest(conditions);
     if neighbors < needed {
         return Err(OperatorError::TooFew { neighbors, conditions, needed }.into());
     }

@@ -2,7 +2,7 @@
 
 use super::Settings;
 use crate::error::Result;
-use crate::moment::MomentSystem;
+use crate::moment::{BatchSystem, MomentSystem};
 use crate::multi_index::{Term, common_degree};
 use crate::operator::Sign;
 use crate::operator::expression::{Operator, collect};
@@ -33,26 +33,41 @@ impl Pairing {
 #[derive(Clone, Debug)]
 pub(super) struct Group<const D: usize> {
     /// Output k of the operator and its degree m, for every right-hand side.
-    pub(super) outputs: Vec<(usize, u32)>,
+    outputs: Vec<(usize, u32)>,
     pairing: Pairing,
     /// All conditions, the zeroth moment among them.
-    plain: MomentSystem<f64, D>,
+    plain: Conditions<D>,
     /// Those of '-' at a particle, where the zeroth moment is free.
-    own: Option<MomentSystem<f64, D>>,
+    own: Option<Conditions<D>>,
+}
+
+/// Conditions, as the solvers of one stencil and of many want them.
+#[derive(Clone, Debug)]
+pub(super) struct Conditions<const D: usize> {
+    pub(super) system: MomentSystem<f64, D>,
+    pub(super) batch: BatchSystem<D>,
+}
+
+impl<const D: usize> Conditions<D> {
+    fn new(terms: &[Vec<Term<D>>], degree: u32, order: u32, low: u32) -> Result<Self> {
+        let system = MomentSystem::new(terms, degree, order, low)?;
+        Ok(Self { batch: BatchSystem::new(&system), system })
+    }
 }
 
 impl<const D: usize> Group<D> {
     /// The conditions at a particle.
     pub(super) fn at_particle(&self) -> &MomentSystem<f64, D> {
-        self.own.as_ref().unwrap_or(&self.plain)
+        &self.own.as_ref().unwrap_or(&self.plain).system
     }
 
-    /// Conditions and pairing of a target that is a particle, or is none.
-    pub(super) fn at(&mut self, particle: bool) -> (&mut MomentSystem<f64, D>, Pairing) {
-        match &mut self.own {
-            Some(own) if particle => (own, self.pairing),
-            _ if particle => (&mut self.plain, self.pairing),
-            _ => (&mut self.plain, Pairing::Plain),
+    /// Outputs, conditions and pairing of a target that is a particle, or is none.
+    pub(super) fn at(&mut self, particle: bool) -> (&[(usize, u32)], &mut Conditions<D>, Pairing) {
+        let Self { outputs, pairing, plain, own } = self;
+        match own {
+            Some(own) if particle => (outputs, own, *pairing),
+            _ if particle => (outputs, plain, *pairing),
+            _ => (outputs, plain, Pairing::Plain),
         }
     }
 }
@@ -93,9 +108,9 @@ pub(super) fn grouped<const D: usize, Op: Operator<D>>(
         done.push((top, pairing));
         let members: Vec<usize> = (0..kinds.len()).filter(|&k| key(&kinds[k]) == (top, pairing)).collect();
         let terms: Vec<Vec<Term<D>>> = members.iter().map(|&k| outputs[k].clone()).collect();
-        let plain = MomentSystem::new(&terms, top, order, 0)?;
+        let plain = Conditions::new(&terms, top, order, 0)?;
         let own = match pairing {
-            Pairing::Difference if !settings.impose_zeroth => Some(MomentSystem::new(&terms, top, order, 1)?),
+            Pairing::Difference if !settings.impose_zeroth => Some(Conditions::new(&terms, top, order, 1)?),
             _ => None,
         };
         let outputs = members.into_iter().map(|k| (k, kinds[k].0)).collect();
