@@ -467,14 +467,24 @@ fn time_dependent_conditions_are_those_of_the_moment() {
     }
 }
 
+/// Condition and iterations of the coupled system between walls with du/dn given everywhere.
+fn coupled<const D: usize>(n: usize, order: u32) -> (f64, usize) {
+    let set = Walled::<D>::new(n, 0.3, 8);
+    let needed = 2 * gradient::<D>(order, 3.0).fewest_neighbors::<D>().unwrap();
+    let cells = Nearest::build(&set.particles, &Domain::open(), needed).unwrap();
+    let mut boundary = BoundaryRows::build(&set.neumann(), order, &cells).unwrap();
+    let report = boundary.impose(|_| 1.0, &mut vec![0.0; set.points().len()]).unwrap();
+    (report.condition, report.iterations)
+}
+
 #[test]
 fn coupled_system_stays_well_conditioned_under_refinement() {
-    for order in [2, 4] {
-        for n in [10, 20, 40] {
-            let set = Walled::<2>::new(n, 0.3, 8);
-            let mut boundary = BoundaryRows::build(&set.neumann(), order, &set.cells(order, 3.0)).unwrap();
-            let report = boundary.impose(|_| 1.0, &mut vec![0.0; set.points().len()]).unwrap();
-            assert!(report.condition < 60.0 && report.iterations <= 12, "r {order} n {n}: {report:?}");
+    // Seen: 5 to 6 and 11 to 13 in 2D, 69 to 76 and 199 to 279 in 3D.
+    for (order, plane, space) in [(2, 12.0, 150.0), (4, 25.0, 560.0)] {
+        let plane = [10, 20, 40].map(|n| (coupled::<2>(n, order), plane));
+        let space = [6, 9].map(|n| (coupled::<3>(n, order), space));
+        for ((condition, iterations), high) in plane.into_iter().chain(space) {
+            assert!(condition < high && iterations <= 40, "r {order}: condition {condition}, {iterations} iterations");
         }
     }
 }
