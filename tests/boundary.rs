@@ -423,7 +423,8 @@ fn heat_error(n: usize, order: u32, seed: u64) -> f64 {
         let exact = exact(end, x);
         (off + (u - exact).powi(2), size + exact * exact)
     });
-    (off / size as f64).sqrt()
+    let ratio: f64 = off / size;
+    ratio.sqrt()
 }
 
 #[test]
@@ -642,7 +643,8 @@ fn rows_of_moved_particles_are_stale() {
     let boundary = BoundaryRows::build(&set.neumann(), 2, &set.cells(2, 3.0)).unwrap();
     let old = set.particles.generation();
     boundary.validate(old).unwrap();
-    set.particles.set_points(&set.points().to_vec()).unwrap();
+    let points = set.points().to_vec();
+    set.particles.set_points(&points).unwrap();
     let error = boundary.validate(set.particles.generation()).unwrap_err();
     assert_eq!(error.kind(), &ApplyError::Stale { rows: old, set: set.particles.generation() }.into());
 }
