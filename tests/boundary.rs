@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 use parops::{
-    Apply, ApplyError, BoundaryCondition, BoundaryError, BoundaryRows, CellList, CsrMatrix, Cutoff, DcPse, Domain,
-    ErrorKind, Face, Gradient, Laplacian, LinearError, MultiIndex, MultiIndexError, Nearest, OperatorError, Particles,
-    Plan, Random, Rk4, Rows, Sign, SparseSolver, StepLimit, graded, integrate,
+    Apply, ApplyError, BoundaryCondition, BoundaryError, BoundaryRows, CellList, Contraction, CsrMatrix, Cutoff, DcPse,
+    Domain, ErrorKind, Face, Gradient, Laplacian, LinearError, MultiIndex, MultiIndexError, Nearest, OperatorError,
+    Particles, Plan, Random, Rk4, Rows, Sign, SparseSolver, StepLimit, graded, integrate,
 };
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
@@ -299,7 +299,7 @@ impl<const D: usize> Insulated<D> {
         self.boundary.replace_values(|_| 0.0, du)
     }
 
-    /// The largest real part of the eigenvalues, relative to their largest modulus.
+    /// The growth of inner values.
     fn growth(&mut self) -> f64 {
         let inner: Vec<usize> = (0..self.set.points().len()).filter(|&p| self.set.normals[p].is_none()).collect();
         let (mut u, mut du) = (vec![0.0; self.full.len()], vec![0.0; self.full.len()]);
@@ -310,21 +310,90 @@ impl<const D: usize> Insulated<D> {
             u[q] = 0.0;
             inner.iter().enumerate().for_each(|(i, &p)| dense[(i, j)] = du[p]);
         }
-        let eigenvalues = dense.complex_eigenvalues();
-        let largest = eigenvalues.iter().map(|e| e.norm()).fold(0.0, f64::max);
-        eigenvalues.iter().map(|e| e.re).fold(f64::NEG_INFINITY, f64::max) / largest
+        growth(&dense)
     }
+}
+
+/// The largest real part of the eigenvalues, relative to their largest modulus.
+fn growth(dense: &DMatrix<f64>) -> f64 {
+    let eigenvalues = dense.complex_eigenvalues();
+    let largest = eigenvalues.iter().map(|e| e.norm()).fold(0.0, f64::max);
+    eigenvalues.iter().map(|e| e.re).fold(f64::NEG_INFINITY, f64::max) / largest
 }
 
 /// Largest relative real part that counts as zero, where the constant has the eigenvalue 0: rounding of a dense
 /// eigenvalue solve of 10^2 unknowns, n^2 eps, times a condition of the eigenvectors of 10^3.
 const NEUTRAL: f64 = 1e-9;
 
+/// The same for rows of normal derivatives with their `ratio` l nearest neighbors as they are, none of them widened.
+fn growth_of_plain_rows(n: usize, order: u32, ratio: f64, seed: u64) -> f64 {
+    let box_ = Insulated::<2>::new(n, order, 3.0, seed);
+    let gradient = gradient::<2>(order, ratio);
+    let needed = gradient.fewest_neighbors::<2>().unwrap();
+    let nearest = Nearest::build(&box_.set.particles, &Domain::open(), needed).unwrap();
+    let normals: Vec<[f64; 2]> = box_.set.normals.iter().map(|normal| normal.unwrap_or([0.0; 2])).collect();
+    let normal = Contraction::new(gradient, normals).unwrap().assemble(&nearest).unwrap().to_csr(0).unwrap();
+    let laplacian = box_.laplacian.to_csr(0).unwrap();
+    let (inner, walls): (Vec<usize>, Vec<usize>) = (0..box_.full.len()).partition(|&p| box_.set.normals[p].is_none());
+    let part = |matrix: &CsrMatrix, rows: &[usize], columns: &[usize]| {
+        let mut place = vec![None; box_.full.len()];
+        columns.iter().enumerate().for_each(|(j, &q)| place[q] = Some(j));
+        let mut dense = DMatrix::zeros(rows.len(), columns.len());
+        for (i, &p) in rows.iter().enumerate() {
+            let (columns, values) = matrix.row(p).unwrap();
+            for (&q, value) in columns.iter().zip(values) {
+                place[q as usize].into_iter().for_each(|j| dense[(i, j)] = *value);
+            }
+        }
+        dense
+    };
+    let values = part(&normal, &walls, &walls).lu().solve(&part(&normal, &walls, &inner)).unwrap();
+    growth(&(part(&laplacian, &inner, &inner) - part(&laplacian, &inner, &walls) * values))
+}
+
 #[test]
-fn insulated_walls_of_order_four_need_three_neighbors_per_condition() {
-    let growing = |ratio| (0..60).filter(|&seed| Insulated::<2>::new(12, 4, ratio, seed).growth() > NEUTRAL).count();
-    assert_eq!(growing(3.0), 0);
+fn insulated_walls_of_order_four_grow_with_two_neighbors_per_condition_but_not_with_three() {
+    let growing = |ratio| (0..60).filter(|&seed| growth_of_plain_rows(12, 4, ratio, seed) > NEUTRAL).count();
     assert!(growing(2.0) > 0);
+    assert_eq!(growing(3.0), 0);
+    // Widened where the wall value hardly counts, both are stable.
+    for ratio in [2.0, 3.0] {
+        let growing = (0..60).filter(|&seed| Insulated::<2>::new(12, 4, ratio, seed).growth() > NEUTRAL).count();
+        assert_eq!(growing, 0, "{ratio}");
+    }
+}
+
+#[test]
+fn rows_in_which_the_boundary_value_hardly_counts_are_widened() {
+    let share = |boundary: &BoundaryRows, i: usize| {
+        let (columns, values) = boundary.matrix().row(i).unwrap();
+        let own = columns.binary_search(&(boundary.particles()[i] as u32)).unwrap();
+        values[own] / values.iter().map(|value| value.abs()).sum::<f64>()
+    };
+    // A quarter of the shares 0.375 and 0.195 of one-sided differences of order 2 and 4.
+    for (order, least) in [(2, 0.093), (4, 0.048)] {
+        let mut grown = 0;
+        for seed in 0..10 {
+            let set = Walled::<2>::new(12, 0.3, seed);
+            // Room for three widenings, also in corners.
+            let cells = CellList::build(&set.particles, &Domain::open(), Cutoff(16.0 * set.h)).unwrap();
+            let boundary = BoundaryRows::build_with(&set.neumann(), &gradient(order, 2.0), &cells).unwrap();
+            assert!((0..boundary.particles().len()).all(|i| share(&boundary, i) >= least));
+            grown += boundary.report().grown;
+        }
+        assert!(grown > 0);
+    }
+}
+
+#[test]
+fn normal_that_points_inwards_is_refused() {
+    let set = Walled::<2>::new(12, 0.3, 2);
+    let inwards =
+        set.boundary().map(|(p, normal)| BoundaryCondition::neumann(p, normal.map(|n| -n))).collect::<Vec<_>>();
+    let error = BoundaryRows::build(&inwards, 2, &set.cells(2, 3.0)).unwrap_err();
+    let weak =
+        |kind: &ErrorKind| matches!(kind, ErrorKind::Boundary(BoundaryError::OwnWeight { share, .. }) if *share < 0.0);
+    assert!(weak(error.kind()) && error.particle() == Some(inwards[0].particle()), "{error}");
 }
 
 #[test]
@@ -354,7 +423,8 @@ fn heat_error(n: usize, order: u32, seed: u64) -> f64 {
         let exact = exact(end, x);
         (off + (u - exact).powi(2), size + exact * exact)
     });
-    (off / size as f64).sqrt()
+    let ratio: f64 = off / size;
+    ratio.sqrt()
 }
 
 #[test]
@@ -398,14 +468,24 @@ fn time_dependent_conditions_are_those_of_the_moment() {
     }
 }
 
+/// Condition and iterations of the coupled system between walls with du/dn given everywhere.
+fn coupled<const D: usize>(n: usize, order: u32) -> (f64, usize) {
+    let set = Walled::<D>::new(n, 0.3, 8);
+    let needed = 2 * gradient::<D>(order, 3.0).fewest_neighbors::<D>().unwrap();
+    let cells = Nearest::build(&set.particles, &Domain::open(), needed).unwrap();
+    let mut boundary = BoundaryRows::build(&set.neumann(), order, &cells).unwrap();
+    let report = boundary.impose(|_| 1.0, &mut vec![0.0; set.points().len()]).unwrap();
+    (report.condition, report.iterations)
+}
+
 #[test]
 fn coupled_system_stays_well_conditioned_under_refinement() {
-    for order in [2, 4] {
-        for n in [10, 20, 40] {
-            let set = Walled::<2>::new(n, 0.3, 8);
-            let mut boundary = BoundaryRows::build(&set.neumann(), order, &set.cells(order, 3.0)).unwrap();
-            let report = boundary.impose(|_| 1.0, &mut vec![0.0; set.points().len()]).unwrap();
-            assert!(report.condition < 60.0 && report.iterations <= 12, "r {order} n {n}: {report:?}");
+    // Seen: 5 to 6 and 11 to 13 in 2D, 69 to 76 and 199 to 279 in 3D.
+    for (order, plane, space) in [(2, 12.0, 150.0), (4, 25.0, 560.0)] {
+        let plane = [10, 20, 40].map(|n| (coupled::<2>(n, order), plane));
+        let space = [6, 9].map(|n| (coupled::<3>(n, order), space));
+        for ((condition, iterations), high) in plane.into_iter().chain(space) {
+            assert!(condition < high && iterations <= 40, "r {order}: condition {condition}, {iterations} iterations");
         }
     }
 }
@@ -417,14 +497,7 @@ fn steady(set: &Walled<2>, conditions: &[BoundaryCondition<2>]) -> (CsrMatrix, B
     let cells = CellList::build(&set.particles, &Domain::open(), cutoff).unwrap();
     let rows = laplacian.assemble(&cells).unwrap();
     let boundary = BoundaryRows::build(conditions, 2, &set.cells(2, 3.0)).unwrap();
-    let mut triplets = Vec::new();
-    for p in 0..rows.targets() {
-        let row = rows.row(p).unwrap();
-        for (&q, [w]) in row.sources.iter().zip(row.weights) {
-            triplets.extend([(p, q as usize, *w), (p, p, -w)]);
-        }
-    }
-    let mut matrix = CsrMatrix::from_triplets(rows.targets(), rows.targets(), triplets).unwrap();
+    let mut matrix = rows.to_csr(0).unwrap();
     boundary.replace_in(&mut matrix).unwrap();
     (matrix, boundary)
 }
@@ -570,7 +643,8 @@ fn rows_of_moved_particles_are_stale() {
     let boundary = BoundaryRows::build(&set.neumann(), 2, &set.cells(2, 3.0)).unwrap();
     let old = set.particles.generation();
     boundary.validate(old).unwrap();
-    set.particles.set_points(&set.points().to_vec()).unwrap();
+    let points = set.points().to_vec();
+    set.particles.set_points(&points).unwrap();
     let error = boundary.validate(set.particles.generation()).unwrap_err();
     assert_eq!(error.kind(), &ApplyError::Stale { rows: old, set: set.particles.generation() }.into());
 }

@@ -11,19 +11,23 @@ use crate::solve::Solved;
 
 type Drawn = Result<(), Box<dyn Error>>;
 
-/// Relative L2 error against h, with the slopes h^2 and h^4.
+/// Relative L2 and largest errors against 1/h, with the slopes h^2 and h^4.
 pub fn orders(path: &Path, square: &[Solved<2>], ball: &[Solved<3>]) -> Drawn {
-    let axes = |title| Axes { title, x: "h", y: "relative L2 error", logarithmic: true };
-    draw(path, &[(axes("square with a hole"), curves(square)), (axes("ball"), curves(ball))])
+    let axes = |title| Axes { title, x: "1/h", y: "relative error", logarithmic: true };
+    let square = (axes("square with a hole"), curves(square, Mark::Circles));
+    draw(path, &[square, (axes("ball"), curves(ball, Mark::Triangles))])
 }
 
-fn curves<const D: usize>(all: &[Solved<D>]) -> Vec<Curve> {
+fn curves<const D: usize>(all: &[Solved<D>], mark: Mark) -> Vec<Curve> {
     let mut curves = Vec::new();
     for (color, series) in all.chunk_by(|a, b| a.order == b.order).enumerate() {
         let (Some(first), Some(last)) = (series.first(), series.last()) else { continue };
-        let points = series.iter().map(|solved| (solved.h, solved.l2)).collect();
-        curves.push(Curve { name: format!("r = {}", first.order), points, mark: Mark::Circles, color });
-        let at = |h: f64| (h, 1.5 * first.l2 * (h / first.h).powi(first.order as i32));
+        let of = |error: fn(&Solved<D>) -> f64| series.iter().map(|solved| (1.0 / solved.h, error(solved))).collect();
+        let order = first.order;
+        curves.push(Curve { name: format!("r = {order}, L2"), points: of(|solved| solved.l2), mark, color });
+        let largest = of(|solved| solved.linf);
+        curves.push(Curve { name: format!("r = {order}, largest"), points: largest, mark: Mark::Crosses, color });
+        let at = |h: f64| (1.0 / h, 0.6 * first.l2 * (h / first.h).powi(order as i32));
         let name = if color == 0 { "h^2, h^4".into() } else { String::new() };
         curves.push(Curve { name, points: vec![at(first.h), at(last.h)], mark: Mark::Line, color: 7 });
     }
@@ -33,12 +37,15 @@ fn curves<const D: usize>(all: &[Solved<D>]) -> Vec<Curve> {
 /// A dot: its place in the plane and its value.
 type Dot = ([f64; 2], f64);
 
-/// u of order 4, and the errors of both orders, on the finest square.
+/// Particles in one panel at most, so that the file stays small.
+const MOST: usize = 5000;
+
+/// u of order 4, and the errors of both orders, on the finest square of at most [`MOST`] particles.
 pub fn square(path: &Path, all: &[Solved<2>]) -> Drawn {
     panels(path, all, [0.0, 1.0], |_, x| Some(*x))
 }
 
-/// The same in a slice through the center of the finest ball, a spacing thick.
+/// The same in a slice through the center of a ball, a spacing thick.
 pub fn ball(path: &Path, all: &[Solved<3>]) -> Drawn {
     panels(path, all, [-0.5, 0.5], |h, x| (x[1].abs() <= 0.5 * h).then_some([x[0], x[2]]))
 }
@@ -49,7 +56,10 @@ fn panels<const D: usize>(
     range: [f64; 2],
     place: impl Fn(f64, &[f64; D]) -> Option<[f64; 2]>,
 ) -> Drawn {
-    let finest: Vec<&Solved<D>> = all.chunk_by(|a, b| a.order == b.order).filter_map(|series| series.last()).collect();
+    let finest: Vec<&Solved<D>> = all
+        .chunk_by(|a, b| a.order == b.order)
+        .filter_map(|series| series.iter().rev().find(|solved| solved.particles <= MOST))
+        .collect();
     let dots = |solved: &Solved<D>, values: &[f64]| -> Vec<Dot> {
         let places = solved.points.iter().zip(values);
         places.filter_map(|(x, &value)| Some((place(solved.h, x)?, value))).collect()
@@ -93,9 +103,11 @@ fn panel<'a>(
         .x_label_area_size(26)
         .y_label_area_size(42)
         .build_cartesian_2d(axis(), axis())?;
-    chart.configure_mesh().disable_mesh().label_style(("sans-serif", 14)).draw()?;
+    let label = |x: &f64| format!("{:.1}", x + 0.0);
+    let mut mesh = chart.configure_mesh();
+    mesh.disable_mesh().x_label_formatter(&label).y_label_formatter(&label).label_style(("sans-serif", 14)).draw()?;
     let (width, _) = chart.plotting_area().dim_in_pixel();
-    let radius = (0.5 * h / (range[1] - range[0]) * f64::from(width)).max(1.0);
+    let radius = (0.4 * h / (range[1] - range[0]) * f64::from(width)).max(1.0);
     chart.draw_series(
         dots.iter().map(|&([x, y], value)| Circle::new((x, y), radius.round() as i32, color(share(value)).filled())),
     )?;

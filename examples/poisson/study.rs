@@ -14,9 +14,9 @@ const BAND: f64 = 0.3;
 /// Particles along the square and across the ball, refinement after refinement.
 fn sides(quick: bool, dim: usize) -> &'static [usize] {
     match (quick, dim) {
-        (true, 2) => &[24, 36, 54],
-        (true, _) => &[12, 16, 20],
-        (false, 2) => &[24, 36, 54, 80, 120],
+        (true, 2) => &[32, 44, 60],
+        (true, _) => &[12, 15, 18],
+        (false, 2) => &[32, 48, 72, 108],
         (false, _) => &[12, 16, 20, 25],
     }
 }

@@ -11,12 +11,7 @@
 //! An evolution knows u_I and needs u_B: A_BB, as large as there are Neumann and Robin particles, is solved once an
 //! application. A steady problem has one row a particle, the operator's inside and the condition's at the boundary.
 //!
-//! What makes A_BB regular is the weight of u_p in its own row: positive, and not small beside the others. Rows are
-//! widened until it is, and condition numbers of A_BB are then 1.2 (1D) to some ten, however many particles there are;
-//! a Robin term with a b >= 0 only helps. A_BB can be singular for a b < 0, where a u_p cancels what du/dn takes of u_p
-//! (a ~ -b/h), and a normal that points inwards is refused, for u_p then has the wrong sign.
-//! A steady problem with Neumann conditions only is singular whatever the rows: a constant can be added to u. Its solver
-//! says so; fix one value, or take a Robin condition somewhere.
+//! When these are singular: see [`BoundaryRows`].
 
 mod chosen;
 mod condition;
