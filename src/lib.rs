@@ -34,6 +34,7 @@
 //! `testing`: conformance checkers for kernels, providers, methods and steppers, ours and the user's own.
 
 mod apply;
+mod boundary;
 mod domain;
 mod error;
 mod exp;
@@ -51,6 +52,7 @@ mod stencil;
 mod time;
 
 pub use apply::{Apply, Field, Histogram, MatrixFree, RawRows, Report, Row, Rows, Strided, Vector};
+pub use boundary::*;
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
 pub use error::*;
 pub use kernel::{

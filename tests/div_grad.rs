@@ -1,8 +1,11 @@
 //! div(D grad f): exactness, order, the two means across a jump, growing modes, refusals.
 
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{DMatrix, DVector};
 use parops::{
-    Apply, CellList, DcPse, DivGrad, Domain, ErrorKind, Face, Laplacian, Mean, OperatorError, ParticleError, Particles,
-    Pse,
+    Apply, CellList, Cutoff, DcPse, DivGrad, Domain, ErrorKind, Face, Laplacian, Mean, OperatorError, ParticleError,
+    Particles, Pse, Rows,
 };
 
 type Failure = Result<(), parops::Error>;
@@ -103,5 +106,168 @@ fn refusals_name_the_particle_and_the_numbers() -> Failure {
     let error = DivGrad::new(plus, vec![1.0; 64])?.assemble(&neighbors).unwrap_err();
     assert!(matches!(error.kind(), ErrorKind::Operator(OperatorError::NotDifference { expected: 0.0, .. })));
     assert!(error.particle().is_some());
+    Ok(())
+}
+
+/// 1.3 times the cutoff whose ball holds the fewest neighbors of a row in the mean: enough for every row of a torus.
+fn on_torus(particles: &Particles<2>, r: u32) -> Result<(DcPse<Laplacian<2>>, CellList<2>), parops::Error> {
+    let dcpse = DcPse::at_order(Laplacian::<2>, r)?;
+    let needed = dcpse.fewest_neighbors::<2>()? as f64 / particles.len() as f64;
+    let torus = Domain::periodic([0.0; 2], [1.0; 2])?;
+    let neighbors = CellList::build(particles, &torus, Cutoff(1.3 * (needed / PI).sqrt()))?;
+    Ok((dcpse, neighbors))
+}
+
+/// Fit of the root mean square error over four jittered sets on a torus; the median of five seeds.
+fn observed_order(r: u32, mean: Mean) -> Result<f64, parops::Error> {
+    let sizes = [40, 54, 74, 100];
+    let exact = |&[x, y]: &[f64; 2]| {
+        let (d, dx) = (2.0 + 0.5 * (TAU * x).sin(), 0.5 * TAU * (TAU * x).cos());
+        let ux = TAU * (TAU * x).cos();
+        let lap = -TAU * TAU * ((TAU * x).sin() + (TAU * y).cos());
+        d * lap + dx * ux
+    };
+    let mut orders = Vec::new();
+    for seed in 0..5 {
+        let mut points = Vec::new();
+        for n in sizes {
+            let particles = Particles::jittered([0.0; 2], [1.0; 2], [n; 2], 0.3, seed)?;
+            let (dcpse, neighbors) = on_torus(&particles, r)?;
+            let diffusivity = sampled(&particles, |x| 2.0 + 0.5 * (TAU * x[0]).sin());
+            let rows = DivGrad::new(dcpse, diffusivity)?.mean(mean).assemble(&neighbors)?;
+            let mut out = vec![0.0; particles.len()];
+            rows.apply(&sampled(&particles, |&[x, y]| (TAU * x).sin() + (TAU * y).cos()), &mut out)?;
+            let squares = particles.points().iter().zip(&out).map(|(x, out)| (out - exact(x)).powi(2));
+            points.push((-(n as f64).ln(), 0.5 * (squares.sum::<f64>() / out.len() as f64).ln()));
+        }
+        orders.push(slope(&points));
+    }
+    orders.sort_by(f64::total_cmp);
+    Ok(orders[2])
+}
+
+/// The slope of the line through these points with the least squares.
+fn slope(points: &[(f64, f64)]) -> f64 {
+    let n = points.len() as f64;
+    let mean = points.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
+    let (over, under) = points
+        .iter()
+        .fold((0.0, 0.0), |(over, under), p| (over + (p.0 - mean.0) * (p.1 - mean.1), under + (p.0 - mean.0).powi(2)));
+    over / under
+}
+
+#[test]
+fn smooth_diffusivity_keeps_the_order_of_the_laplacian_on_jittered_sets_with_either_mean() -> Failure {
+    for mean in [Mean::Arithmetic, Mean::Harmonic] {
+        for r in [2, 4] {
+            let order = observed_order(r, mean)?;
+            println!("{mean:?}, r = {r}: {order:.3}");
+            assert!((order - f64::from(r)).abs() < 0.1, "{mean:?}, r = {r}: {order}");
+        }
+    }
+    Ok(())
+}
+
+/// Root mean square error of the steady state in a square of two layers, D = 1 to x = 1/2 and `contrast` beyond, with a
+/// flux of 1 / (1/2 + 1/2 / `contrast`) along x; the values in a frame of 0.15 are given.
+fn layered_error<const D: usize>(n: usize, seed: u64, r: u32, mean: Mean, contrast: f64) -> Result<f64, parops::Error> {
+    let particles = Particles::jittered([0.0; D], [1.0; D], [n; D], 0.3, seed)?;
+    let diffusivity = sampled(&particles, |x| if x[0] < 0.5 { 1.0 } else { contrast });
+    let flux = 1.0 / (0.5 + 0.5 / contrast);
+    let exact = |x: &[f64; D]| flux * (x[0].min(0.5) + (x[0] - 0.5).max(0.0) / contrast);
+    let dcpse = DcPse::at_order(Laplacian::<D>, r)?;
+    let neighbors = CellList::build(&particles, &Domain::open(), dcpse.cutoff(&particles)?)?;
+    let mut matrix = dense(&DivGrad::new(dcpse, diffusivity)?.mean(mean).assemble(&neighbors)?);
+    let mut right = DVector::zeros(particles.len());
+    for (p, x) in particles.points().iter().enumerate() {
+        if x.iter().any(|x| !(0.15..0.85).contains(x)) {
+            matrix.row_mut(p).fill(0.0);
+            matrix[(p, p)] = 1.0;
+            right[p] = exact(x);
+        }
+    }
+    let u = matrix.lu().solve(&right).unwrap();
+    let squares = particles.points().iter().zip(u.iter()).map(|(x, u)| (u - exact(x)).powi(2));
+    Ok((squares.sum::<f64>() / particles.len() as f64).sqrt())
+}
+
+fn dense(rows: &Rows) -> DMatrix<f64> {
+    let n = rows.targets();
+    let mut matrix = DMatrix::zeros(n, n);
+    for p in 0..n {
+        let row = rows.row(p).unwrap();
+        matrix[(p, p)] += row.diagonal[0];
+        for (&q, w) in row.sources.iter().zip(row.weights) {
+            matrix[(p, q as usize)] += w[0];
+            matrix[(p, p)] -= w[0];
+        }
+    }
+    matrix
+}
+
+#[test]
+fn flux_through_a_jump_is_right_with_the_harmonic_mean_and_several_times_worse_with_the_arithmetic() -> Failure {
+    // Both are of first order; the means over three seeds differ by 6 to 10 times.
+    let mean_error = |n: usize, mean| -> Result<f64, parops::Error> {
+        let sum: Result<f64, _> = (0..3).map(|seed| layered_error::<1>(n, seed, 2, mean, 100.0)).sum();
+        Ok(sum? / 3.0)
+    };
+    let mut points = Vec::new();
+    for n in [20, 40, 80, 160] {
+        let (harmonic, arithmetic) = (mean_error(n, Mean::Harmonic)?, mean_error(n, Mean::Arithmetic)?);
+        println!("1D, {n}: harmonic {harmonic:.2e}, arithmetic {arithmetic:.2e}");
+        assert!(5.0 * harmonic < arithmetic, "{n}: {harmonic} {arithmetic}");
+        points.push((-(n as f64).ln(), harmonic.ln()));
+    }
+    let order = slope(&points);
+    println!("order {order:.2}");
+    assert!((0.8..1.5).contains(&order), "{order}");
+    for r in [2, 4] {
+        let harmonic = layered_error::<2>(24, 1, r, Mean::Harmonic, 100.0)?;
+        let arithmetic = layered_error::<2>(24, 1, r, Mean::Arithmetic, 100.0)?;
+        println!("2D, r = {r}: harmonic {harmonic:.2e}, arithmetic {arithmetic:.2e}");
+        assert!(5.0 * harmonic < arithmetic && harmonic < 0.02, "{r}: {harmonic} {arithmetic}");
+    }
+    Ok(())
+}
+
+/// What a torus with a layer of D = `contrast` gives: the largest real part of an eigenvalue over the largest modulus,
+/// the rows, and how many of them reach over a face of the layer.
+fn growth(r: u32, mean: Mean, contrast: f64, seed: u64) -> Result<(f64, Rows, usize), parops::Error> {
+    let particles = Particles::jittered([0.0; 2], [1.0; 2], [20; 2], 0.3, seed)?;
+    let (dcpse, neighbors) = on_torus(&particles, r)?;
+    let diffusivity = sampled(&particles, |x| if x[0] < 0.5 { contrast } else { 1.0 });
+    let rows = DivGrad::new(dcpse, diffusivity.clone())?.mean(mean).assemble(&neighbors)?;
+    let mixed = |p: &usize| rows.row(*p).unwrap().sources.iter().any(|&q| diffusivity[q as usize] != diffusivity[*p]);
+    let mixed = (0..rows.targets()).filter(mixed).count();
+    let values = dense(&rows).complex_eigenvalues();
+    let largest = values.iter().map(|value| value.norm()).fold(0.0, f64::max);
+    let growing = values.iter().map(|value| value.re).fold(f64::NEG_INFINITY, f64::max);
+    Ok((growing / largest, rows, mixed))
+}
+
+#[test]
+fn order_four_with_the_arithmetic_mean_grows_across_a_contrast_of_100_and_nothing_else_does() -> Failure {
+    // Constants have eigenvalue zero: their rounding, over the largest eigenvalue.
+    const ZERO: f64 = 1e-12;
+    for seed in 0..3 {
+        let (growing, rows, mixed) = growth(4, Mean::Arithmetic, 100.0, seed)?;
+        println!("seed {seed}: {growing:.2e} of the largest, {mixed} of {} rows reach across", rows.targets());
+        assert!(growing > 1e-3, "seed {seed}: {growing}");
+        let report = rows.report();
+        assert_eq!((report.contrast, report.growing), (100.0, mixed));
+        assert!(0 < mixed && mixed < rows.targets());
+    }
+    for (r, mean, contrast) in [
+        (2, Mean::Arithmetic, 100.0),
+        (2, Mean::Harmonic, 100.0),
+        (4, Mean::Harmonic, 100.0),
+        (4, Mean::Arithmetic, 10.0),
+        (4, Mean::Arithmetic, 1.0),
+    ] {
+        let (stable, rows, _) = growth(r, mean, contrast, 0)?;
+        assert_eq!((rows.report().contrast, rows.report().growing), (contrast, 0));
+        assert!(stable < ZERO, "r = {r}, {mean:?}, contrast {contrast}: {stable}");
+    }
     Ok(())
 }

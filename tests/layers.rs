@@ -13,6 +13,7 @@ const LAYERS: &[&[&str]] = &[
     &["domain", "particles", "neighbors"],
     &["apply"],
     &["linear"],
+    &["boundary"],
     &["time"],
     &["solver"],
     &["report", "io"],

@@ -9,7 +9,7 @@ use parops::{
     Sph, Stencil, Stepper,
 };
 #[cfg(not(feature = "rayon"))]
-use parops::{Apply, NeighborList, Rows, Strided};
+use parops::{Apply, BoundaryCondition, BoundaryRows, NeighborList, Rows, Strided};
 
 struct Counting;
 
@@ -188,4 +188,20 @@ fn solves_after_the_first_allocate_nothing() -> parops::Result<()> {
         assert_eq!(allocations(|| assert!(solver.solve(&hard, &mut x).is_ok())), 0);
     }
     Ok(())
+}
+
+#[cfg(not(feature = "rayon"))]
+#[test]
+fn imposing_boundary_conditions_allocates_nothing_after_the_first_time() {
+    let lattice = Particles::lattice([0.0; 2], [1.0; 2], [16; 2]).unwrap();
+    let neighbors = CellList::build(&lattice, &Domain::open(), parops::Cutoff(0.5)).unwrap();
+    // The lowest and the highest of the last coordinate.
+    let flux = |p: usize, up: f64| BoundaryCondition::robin(p, [0.0, up], 1.0, 1.0);
+    let conditions: Vec<_> = (0..16).flat_map(|i| [flux(16 * i, -1.0), flux(16 * i + 15, 1.0)]).collect();
+    let mut boundary = BoundaryRows::build(&conditions, 2, &neighbors).unwrap();
+    let mut u = vec![1.0; lattice.len()];
+    let mut impose = |g: f64| assert!(boundary.impose(|p| g + p as f64, &mut u).unwrap().iterations > 0);
+    impose(0.0);
+    assert_eq!(allocations(|| (0..5).for_each(|n| impose(f64::from(n)))), 0);
+    assert_eq!(allocations(|| boundary.replace_values(|_| 0.0, &mut u).unwrap()), 0);
 }

@@ -1,8 +1,8 @@
 //! Named operators and coefficients per particle, by DC-PSE on scattered sets up to their edges.
 
 use parops::{
-    Along, AlongTwice, Apply, BiLaplacian, CellList, Contraction, Curl, DcPse, Domain, ErrorKind, Gradient, Hessian,
-    Laplacian, Operator, ParticleError, Particles, Rows, Sign,
+    Along, AlongTwice, Apply, BiLaplacian, CellList, Contraction, Curl, Cutoff, DcPse, DivGrad, Domain, ErrorKind,
+    Fallback, Gradient, Hessian, Laplacian, Neighbor, Neighbors, Operator, ParticleError, Particles, Rows, Sign,
 };
 
 type Failure = Result<(), parops::Error>;
@@ -204,6 +204,72 @@ fn scalar_per_particle_multiplies_the_bits_of_one_output() -> Failure {
         let (plain, scaled) = (plain.row(p).unwrap(), scaled.row(p).unwrap());
         assert!(plain.weights.iter().zip(scaled.weights).all(|(w, s)| c[0] * w[0] == s[0]));
     }
+    Ok(())
+}
+
+/// Asks for a narrower support than it reaches, so that rows are refused and widened.
+struct Narrow<'a>(&'a CellList<2>, f64);
+
+impl Neighbors<2> for Narrow<'_> {
+    fn targets(&self) -> usize {
+        self.0.targets()
+    }
+
+    fn sources(&self) -> usize {
+        self.0.sources()
+    }
+
+    fn center(&self, p: usize) -> Option<usize> {
+        self.0.center(p)
+    }
+
+    fn cutoff(&self, _: usize) -> f64 {
+        self.1
+    }
+
+    fn reach(&self) -> f64 {
+        self.0.reach()
+    }
+
+    fn generation(&self) -> u64 {
+        self.0.generation()
+    }
+
+    fn for_each(&self, p: usize, cutoff: f64, visit: impl FnMut(Neighbor<2>)) {
+        self.0.for_each(p, cutoff, visit);
+    }
+}
+
+#[test]
+fn widened_lowered_and_empty_rows_pass_through_coefficients_bit_for_bit() -> Failure {
+    let particles = scattered::<2>(14);
+    let n = particles.len();
+    for fallback in [Fallback::LowerOrder, Fallback::Empty] {
+        let laplacian = DcPse::<Laplacian<2>, 4>::new().fallback(fallback);
+        let cells = CellList::build(&particles, &Domain::open(), Cutoff(0.36))?;
+        let neighbors = Narrow(&cells, 0.29);
+        let plain = laplacian.assemble(&neighbors)?;
+        let report = plain.report();
+        assert!(report.grown > 0 && report.lowered + report.empty > 0 && report.grown < n, "{report:?}");
+        let scaled = Contraction::new(laplacian.clone(), vec![[0.7]; n])?;
+        let diffusion = DivGrad::new(laplacian, vec![0.7; n])?;
+        for rows in [scaled.assemble(&neighbors)?, diffusion.assemble(&neighbors)?] {
+            let found = rows.report();
+            let of = |report: &parops::Report| (report.grown, report.lowered, report.empty, report.order, report.rungs);
+            assert_eq!(of(found), of(report));
+            for p in 0..n {
+                let (plain, row) = (plain.row(p).unwrap(), rows.row(p).unwrap());
+                assert!(plain.sources == row.sources);
+                assert!(plain.weights.iter().zip(row.weights).all(|(w, s)| 0.7 * w[0] == s[0]));
+            }
+        }
+    }
+    // Without a policy the refusal is that of the method, with its particle.
+    let laplacian = DcPse::<Laplacian<2>, 4>::new();
+    let cells = CellList::build(&particles, &Domain::open(), Cutoff(0.3))?;
+    let refused = laplacian.assemble(&cells).unwrap_err();
+    assert_eq!(DivGrad::new(laplacian.clone(), vec![0.7; n])?.assemble(&cells).unwrap_err(), refused);
+    assert_eq!(Contraction::new(laplacian, vec![[0.7]; n])?.assemble(&cells).unwrap_err(), refused);
     Ok(())
 }
 

@@ -1,7 +1,9 @@
 //! Several fields at once: each pair is read once for all of them.
 
+use std::borrow::Borrow;
+
 use super::blocks::each_row;
-use super::strided::{RowOfFields, Strided, sweep_fields};
+use super::strided::{LaneRows, Strided, sweep_fields};
 use super::sweep::Sweep;
 use super::{Field, MatrixFree, Rows};
 use crate::error::{ApplyError, Error, Result};
@@ -31,12 +33,12 @@ impl<T: Field> Rows<[f64; 1], T> {
     /// finite. Nothing is written where a value is not finite.
     pub fn apply_fields<const F: usize>(&self, f: &[[T; F]], out: &mut [[T; F]]) -> Result<()> {
         check_fields(&interleaved(f)?, self.sources, out.len(), self.targets())?;
-        each_row(out, |p| self.stored(p).fields(|q| f[q]).map(|[value]| value));
+        each_row(out, |p| self.stored(p).lanes(|q| &f[q]));
         check_results(&interleaved(out)?)
     }
 
     /// Any number of fields at once, each view with strides of its own: as [`apply_fields`](Self::apply_fields), up to
-    /// 16 fields a sweep.
+    /// eight fields a sweep.
     ///
     /// ```
     /// use parops::{CellList, DcPse, Domain, Laplacian, Particles, Strided};
@@ -66,10 +68,10 @@ impl<T: Field> Rows<[f64; 1], T> {
     }
 }
 
-impl<T: Field> RowOfFields<T> for Rows<[f64; 1], T> {
+impl<T: Field> LaneRows<T> for Rows<[f64; 1], T> {
     #[inline(always)]
-    fn fields<const C: usize>(&self, p: usize, value: impl Fn(usize) -> [T; C]) -> [T; C] {
-        self.stored(p).fields(value).map(|[value]| value)
+    fn lanes<V: Borrow<[T; C]>, const C: usize>(&self, p: usize, value: impl Fn(usize) -> V) -> [T; C] {
+        self.stored(p).lanes(value)
     }
 }
 
@@ -80,7 +82,7 @@ impl<const D: usize, M: Method<D, Out = [f64; 1]>, P: Neighbors<D>> MatrixFree<'
     /// As [`Rows::apply_fields`].
     pub fn apply_fields<T: Field, const F: usize>(&self, f: &[[T; F]], out: &mut [[T; F]]) -> Result<()> {
         check_fields(&interleaved(f)?, self.neighbors.sources(), out.len(), self.neighbors.targets())?;
-        self.each(out, |_, worker| worker.fields(|q| f[q]).map(|[value]| value))?;
+        self.each(out, |_, worker| worker.lanes(|q| &f[q]))?;
         check_results(&interleaved(out)?)
     }
 }

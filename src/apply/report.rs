@@ -58,6 +58,10 @@ pub struct Report {
     pub lowered: usize,
     /// Rows left without weights.
     pub empty: usize,
+    /// Largest contrast of the diffusivities in a stencil, see [`RowReport::contrast`].
+    pub contrast: f64,
+    /// Rows in which modes may grow, see [`RowReport::growing`].
+    pub growing: usize,
     /// Rows per decade of the condition number.
     pub conditions: Histogram,
     /// Rows per decade of the residual.
@@ -77,6 +81,11 @@ impl Report {
     /// The first of [`worst_rows`](Self::worst_rows).
     pub fn worst(&self) -> Option<&RowReport> {
         self.worst_rows().next()
+    }
+
+    /// Names the targets anew, where they are some of a larger set.
+    pub(crate) fn rename(&mut self, name: impl Fn(usize) -> usize) {
+        self.worst.iter_mut().flatten().for_each(|row| row.target = name(row.target));
     }
 
     pub(super) fn add(&mut self, row: &RowReport) {
@@ -99,6 +108,8 @@ impl Report {
         self.grown += usize::from(row.grown > 0);
         self.lowered += usize::from(row.lowered > 0);
         self.empty += usize::from(row.empty);
+        self.contrast = self.contrast.max(row.contrast);
+        self.growing += usize::from(row.growing);
         self.rank(row);
     }
 
@@ -126,6 +137,8 @@ impl Report {
         self.grown += next.grown;
         self.lowered += next.lowered;
         self.empty += next.empty;
+        self.contrast = self.contrast.max(next.contrast);
+        self.growing += next.growing;
         next.worst_rows().for_each(|row| self.rank(row));
     }
 

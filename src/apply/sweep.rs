@@ -1,5 +1,7 @@
 //! The arithmetic of one row, the same for stored weights and for weights made on the spot.
 
+use std::borrow::Borrow;
+
 use super::Field;
 
 /// A row of K outputs: out_k = d_k f_p + sum_q w_qk (f_q - f_p), or sum_q w_qk f_q off the particles.
@@ -59,11 +61,45 @@ pub(super) trait Sweep<T: Field, const K: usize> {
 
     /// All outputs of F fields, each as it would be alone.
     #[inline(always)]
-    fn fields<const F: usize>(&self, value: impl Fn(usize) -> [T; F]) -> [[T; K]; F] {
-        self.sum([[T::zero(); K]; F], value, |sum, w, f| {
-            for (sum, f) in sum.iter_mut().zip(f) {
-                sum.iter_mut().zip(w).for_each(|(sum, w)| *sum += *w * *f);
+    fn jacobian<const F: usize>(&self, f: &[[T; F]]) -> [[T; K]; F] {
+        self.sum(
+            [[T::zero(); K]; F],
+            |q| f[q],
+            |sum, w, f| {
+                for (sum, f) in sum.iter_mut().zip(f) {
+                    sum.iter_mut().zip(w).for_each(|(sum, w)| *sum += *w * *f);
+                }
+            },
+        )
+    }
+
+    /// Output 0 of C fields, each as it would be alone; C sums and C values f_p should fit the registers.
+    #[inline(always)]
+    fn lanes<const C: usize, V: Borrow<[T; C]>>(&self, value: impl Fn(usize) -> V) -> [T; C] {
+        let mut sum = [T::zero(); C];
+        let Some(center) = self.center() else {
+            for (q, w) in self.pairs() {
+                let f = value(q);
+                let f = f.borrow();
+                for i in 0..C {
+                    sum[i] += w[0] * f[i];
+                }
             }
-        })
+            return sum;
+        };
+        let own = *value(center).borrow();
+        if let Some(d) = self.diagonal() {
+            for i in 0..C {
+                sum[i] += d[0] * own[i];
+            }
+        }
+        for (q, w) in self.pairs() {
+            let f = value(q);
+            let f = f.borrow();
+            for i in 0..C {
+                sum[i] += w[0] * (f[i] - own[i]);
+            }
+        }
+        sum
     }
 }

@@ -74,7 +74,7 @@ impl<const K: usize, T: Field> Rows<[f64; K], T> {
     /// As [`Apply::apply`](super::Apply::apply).
     pub fn apply_jacobian<const F: usize>(&self, f: &[[T; F]], out: &mut [[[T; K]; F]]) -> Result<()> {
         check(f, self.sources, out, self.targets())?;
-        each_row(out, |p| self.stored(p).fields(|q| f[q]));
+        each_row(out, |p| self.stored(p).jacobian(f));
         check_jacobian(out)
     }
 }
@@ -99,7 +99,7 @@ impl<const D: usize, const K: usize, M: Method<D, Out = [f64; K]>, P: Neighbors<
     /// As [`Apply::apply`](super::Apply::apply).
     pub fn apply_jacobian<T: Field, const F: usize>(&self, f: &[[T; F]], out: &mut [[[T; K]; F]]) -> Result<()> {
         check(f, self.neighbors.sources(), out, self.neighbors.targets())?;
-        self.each(out, |_, worker| worker.fields(|q| f[q]))?;
+        self.each(out, |_, worker| worker.jacobian(f))?;
         check_jacobian(out)
     }
 }

@@ -1,6 +1,7 @@
 //! One error type: a kind, the particle it concerns, and the numbers that broke the rule.
 
 mod apply;
+mod boundary;
 mod domain;
 mod kernel;
 mod linear;
@@ -11,6 +12,7 @@ mod particle;
 mod time;
 
 pub use apply::ApplyError;
+pub use boundary::BoundaryError;
 pub use domain::DomainError;
 pub use kernel::KernelError;
 pub use linear::LinearError;
@@ -124,6 +126,7 @@ impl fmt::Display for ErrorKind {
             ErrorKind::Operator(kind) => kind.fmt(f),
             ErrorKind::Apply(kind) => kind.fmt(f),
             ErrorKind::Linear(kind) => kind.fmt(f),
+            ErrorKind::Boundary(kind) => kind.fmt(f),
             ErrorKind::Time(kind) => kind.fmt(f),
             ErrorKind::User { code } => write!(f, "the caller's own error, code {code}"),
         }
@@ -152,6 +155,8 @@ pub enum ErrorKind {
     Apply(ApplyError),
     /// Sparse matrices and linear solves.
     Linear(LinearError),
+    /// Boundary conditions.
+    Boundary(BoundaryError),
     /// Steppers and step limits.
     Time(TimeError),
     /// An error made by the caller's own code, see [`Error::user`].
@@ -185,5 +190,6 @@ from_kind! {
     Operator: OperatorError,
     Apply: ApplyError,
     Linear: LinearError,
+    Boundary: BoundaryError,
     Time: TimeError,
 }

@@ -16,7 +16,7 @@ pub(super) fn inverse_norm(n: usize, mut solve: impl FnMut(&mut [f64], bool) -> 
     let mut estimate = 0.0_f64;
     let step = 1.0 / (n.max(2) - 1) as f64;
     let mean = |_: usize| 1.0;
-    let alternating = |i: usize| (1.0 + i as f64 * step) * if i % 2 == 0 { 1.0 } else { -1.0 };
+    let alternating = |i: usize| (1.0 + i as f64 * step) * if i.is_multiple_of(2) { 1.0 } else { -1.0 };
     for start in [&mean as &dyn Fn(usize) -> f64, &alternating] {
         x.iter_mut().enumerate().for_each(|(i, x)| *x = start(i));
         let length = sum_abs(&x);

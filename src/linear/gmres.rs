@@ -154,8 +154,7 @@ impl Gmres {
         }
         self.reserve(n)?;
         let scale = inverse_power(largest);
-        self.scaled.clear();
-        self.scaled.extend(b.iter().map(|value| value * scale));
+        self.scaled.iter_mut().zip(b).for_each(|(scaled, value)| *scaled = value * scale);
         let full = norm(&self.scaled);
         let goal = self.tolerance * full;
         self.basis.clear();
@@ -203,7 +202,7 @@ impl Gmres {
             self.small.resize(m + 1, 0.0);
         }
         self.work.resize(n, 0.0);
-        self.scaled.reserve(n);
+        self.scaled.resize(n, 0.0);
         Ok(())
     }
 

@@ -44,10 +44,8 @@ impl<const L: usize> Nodes<L> {
         self.places.clear();
         self.places.reserve(groups * D);
         for group in 0..full {
-            for axis in 0..D {
-                let place = |q: usize| Lanes(std::array::from_fn(|i| z[i][group * GROUP + q][axis]));
-                self.places.push(std::array::from_fn(place));
-            }
+            let place = |q: usize, axis: usize| Lanes(std::array::from_fn(|i| z[i][group * GROUP + q][axis]));
+            self.places.extend((0..D).map(|axis| std::array::from_fn(|q| place(q, axis))));
         }
         self.places.resize(groups * D, blank);
         for (i, z) in z.iter().enumerate() {

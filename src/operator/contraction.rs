@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::draft::Draft;
 use super::method::Method;
 use super::row_report::RowReport;
 use crate::error::{Error, OperatorError, ParticleError, Result};
@@ -11,7 +12,8 @@ use crate::stencil::Stencil;
 /// weight per pair, sum_k c_k(p) w_pq,k.
 ///
 /// v . grad for [`Gradient`](super::Gradient) and a velocity; A : Hessian for [`Hessian`](super::Hessian) and
-/// [`Hessian::packed`](super::Hessian::packed); c Lap for a scalar, K = 1. Exactness, order and signs are those of the
+/// [`Hessian::packed`](super::Hessian::packed); c Lap for a scalar, K = 1; advection and diffusion together for
+/// [`Several`](super::Several). Exactness, order and signs are those of the
 /// method, whose rows are computed and certified as they stand. Where the coefficients are constant, [`Along`](super::Along),
 /// [`AlongTwice`](super::AlongTwice) and [`Times`](super::Times) give the same for fewer solves.
 ///
@@ -64,12 +66,74 @@ impl<M, const K: usize> Contraction<M, K> {
     }
 }
 
-/// Working memory of [`Contraction`]: that of the method, and the row it makes.
+/// Working memory of [`Contraction`]: that of the method, and the rows it makes.
 #[derive(Clone, Debug)]
-pub struct ContractionScratch<S, const K: usize> {
+pub struct ContractionScratch<S, const D: usize, const K: usize> {
     method: S,
-    w: Vec<[f64; K]>,
-    diagonal: [f64; K],
+    /// The first holds the row of a single target; its stencil is not used.
+    drafts: Vec<Draft<D, [f64; K]>>,
+}
+
+impl<M, const K: usize> Contraction<M, K> {
+    /// Contracts a row of the method.
+    fn contract<const D: usize>(
+        &self,
+        row: &Stencil<D>,
+        whole: (&[[f64; K]], &[f64; K]),
+        w: &mut [[f64; 1]],
+        diagonal: &mut [f64; 1],
+    ) -> Result<()> {
+        let coefficients = self.coefficients_of(row.target())?;
+        w.iter_mut().zip(whole.0).for_each(|(w, outputs)| w[0] = dot(coefficients, outputs));
+        diagonal[0] = dot(coefficients, whole.1);
+        Ok(())
+    }
+
+    /// Has `make` turn the drafts of the method into rows, and contracts those that came out.
+    fn through<const D: usize>(
+        &self,
+        drafts: &mut [Draft<D, [f64; 1]>],
+        whole: &mut Vec<Draft<D, [f64; K]>>,
+        make: impl FnOnce(&mut [Draft<D, [f64; K]>]),
+    ) {
+        if whole.len() < drafts.len() {
+            whole.resize(drafts.len(), Draft::default());
+        }
+        let whole = &mut whole[..drafts.len()];
+        for (draft, whole) in drafts.iter_mut().zip(whole.iter_mut()) {
+            std::mem::swap(&mut draft.stencil, &mut whole.stencil);
+            whole.clear();
+            whole.report = draft.report.clone();
+        }
+        make(whole);
+        for (draft, whole) in drafts.iter_mut().zip(whole) {
+            std::mem::swap(&mut draft.stencil, &mut whole.stencil);
+            draft.clear();
+            let Draft { stencil, weights, diagonal, report } = draft;
+            *report = whole.report.clone();
+            if let Ok(known) = whole.report {
+                *report = self
+                    .contract(stencil, (&whole.weights, &whole.diagonal), weights, diagonal)
+                    .map(|()| certify(stencil, weights, diagonal, known));
+            }
+            if let (true, Err(error)) = (draft.report.is_ok(), draft.finite()) {
+                draft.report = Err(error);
+            }
+        }
+    }
+}
+
+/// What the coefficients change in the report of the method.
+fn certify<const D: usize>(row: &Stencil<D>, w: &[[f64; 1]], diagonal: &[f64; 1], mut report: RowReport) -> RowReport {
+    let general = RowReport::of(row, w, diagonal);
+    (report.sum_abs, report.spectral_bound) = (general.sum_abs, general.spectral_bound);
+    report.negative_weights = w.iter().zip(row.signs()).filter(|&(w, &sign)| w[0] * f64::from(sign) < 0.0).count();
+    report
+}
+
+#[inline(always)]
+fn dot<const K: usize>(coefficients: &[f64; K], outputs: &[f64; K]) -> f64 {
+    coefficients.iter().zip(outputs).map(|(c, w)| c * w).sum()
 }
 
 impl<M, const D: usize, const K: usize> Method<D> for Contraction<M, K>
@@ -77,10 +141,10 @@ where
     M: Method<D, Out = [f64; K]>,
 {
     type Out = [f64; 1];
-    type Scratch = ContractionScratch<M::Scratch, K>;
+    type Scratch = ContractionScratch<M::Scratch, D, K>;
 
     fn scratch(&self) -> Result<Self::Scratch> {
-        Ok(ContractionScratch { method: self.method.scratch()?, w: Vec::new(), diagonal: [0.0; K] })
+        Ok(ContractionScratch { method: self.method.scratch()?, drafts: vec![Draft::default()] })
     }
 
     fn validate(&self, targets: usize, sources: usize) -> Result<()> {
@@ -102,15 +166,11 @@ where
         w: &mut [[f64; 1]],
         diagonal: &mut [f64; 1],
     ) -> Result<()> {
-        let coefficients = self.coefficients_of(row.target())?;
-        scratch.w.clear();
-        scratch.w.resize(row.len(), [0.0; K]);
-        self.method.weights(row, &mut scratch.method, &mut scratch.w, &mut scratch.diagonal)?;
-        for (w, outputs) in w.iter_mut().zip(&scratch.w) {
-            w[0] = contract(coefficients, outputs);
-        }
-        diagonal[0] = contract(coefficients, &scratch.diagonal);
-        Ok(())
+        let Draft { weights: outputs, diagonal: own, .. } = &mut scratch.drafts[0];
+        outputs.clear();
+        outputs.resize(row.len(), [0.0; K]);
+        self.method.weights(row, &mut scratch.method, outputs, own)?;
+        self.contract(row, (outputs, own), w, diagonal)
     }
 
     fn report(
@@ -120,15 +180,27 @@ where
         w: &[[f64; 1]],
         diagonal: &[f64; 1],
     ) -> Result<RowReport> {
-        let mut report = self.method.report(row, &scratch.method, &scratch.w, &scratch.diagonal)?;
-        let general = RowReport::of(row, w, diagonal);
-        (report.sum_abs, report.spectral_bound) = (general.sum_abs, general.spectral_bound);
-        report.negative_weights = w.iter().zip(row.signs()).filter(|&(w, &sign)| w[0] * f64::from(sign) < 0.0).count();
-        Ok(report)
+        let Draft { weights: outputs, diagonal: own, .. } = &scratch.drafts[0];
+        Ok(certify(row, w, diagonal, self.method.report(row, &scratch.method, outputs, own)?))
     }
-}
 
-#[inline(always)]
-fn contract<const K: usize>(coefficients: &[f64; K], outputs: &[f64; K]) -> f64 {
-    coefficients.iter().zip(outputs).map(|(c, w)| c * w).sum()
+    fn weights_batch(&self, drafts: &mut [Draft<D, [f64; 1]>], scratch: &mut Self::Scratch) {
+        let ContractionScratch { method, drafts: whole } = scratch;
+        self.through(drafts, whole, |whole| self.method.weights_batch(whole, method));
+    }
+
+    fn growths(&self) -> u32 {
+        self.method.growths()
+    }
+
+    fn can_grow(&self, refusal: &Error) -> bool {
+        self.method.can_grow(refusal)
+    }
+
+    fn stand_in(&self, draft: &mut Draft<D, [f64; 1]>, scratch: &mut Self::Scratch) {
+        let ContractionScratch { method, drafts: whole } = scratch;
+        self.through(std::slice::from_mut(draft), whole, |whole| {
+            whole.iter_mut().for_each(|whole| self.method.stand_in(whole, method));
+        });
+    }
 }

@@ -2,19 +2,24 @@
 
 use std::sync::Arc;
 
+use super::draft::Draft;
 use super::method::{Method, spread};
 use super::row_report::RowReport;
 use crate::error::{Error, OperatorError, ParticleError, Result};
 use crate::stencil::Stencil;
 
+/// The contrast of a stencil above which the arithmetic mean of orders above 2 is reported as growing.
+pub const CONTRAST_LIMIT: f64 = 10.0;
+
 /// The mean of two diffusivities that a pair exchanges with; both are D where the two are equal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mean {
-    /// (D_p + D_q)/2, of the order of the Laplacian for smooth D.
+    /// (D_p + D_q)/2, for smooth D. **Across a contrast above [`CONTRAST_LIMIT`] in a stencil it is several times less accurate than the
+    /// harmonic mean, and at orders above 2 some modes grow there**.
     #[default]
     Arithmetic,
     /// 2 D_p D_q/(D_p + D_q), zero where either is zero: two layers in series, so that the flux through a jump of D is
-    /// continuous. First order there, and of second order for smooth D at most.
+    /// continuous; of first order there.
     Harmonic,
 }
 
@@ -42,11 +47,15 @@ impl Mean {
 /// div(D grad f) for a diffusivity per particle,
 /// (Q f)_p = sum_q m(D_p, D_q) w_pq (f_q - f_p), with the weights w_pq of a Laplacian of the form f_q - f_p.
 ///
-/// Since 2 div(D grad f) = D Lap f + Lap (D f) - f Lap D, the arithmetic mean keeps the order of the Laplacian, and
-/// DC-PSE of order R is exact where D and f are polynomials whose degrees add up to R + 1 at most. An operator
-/// sum_ij A_ij d_i d_j in place of the Laplacian gives div(D A grad f). Constants are annihilated exactly, and PSE
+/// Where D is smooth either mean keeps the order of the Laplacian, since Lap(m(D_p, D) (f - f_p)) at p is
+/// D Lap f + 2 m_2 grad D . grad f, and m_2 = dm/dD = 1/2 at D_p for both. With the arithmetic one DC-PSE of order R is
+/// exact where D and f are polynomials whose degrees add up to R + 1 at most. An operator sum_ij A_ij d_i d_j in place of
+/// the Laplacian gives div(D A grad f). Constants are annihilated exactly, and PSE
 /// conserves as it does with a constant D: both means are symmetric. D counts at the sources; its images are even. D = 0
 /// is legal: an insulator with [`Mean::Harmonic`].
+///
+/// The certificate is that of the Laplacian, with the contrast max D / min D of the stencil and whether modes may grow
+/// there ([`RowReport::growing`]).
 ///
 /// ```
 /// use parops::{Apply, CellList, DcPse, DivGrad, Domain, Laplacian, Particles};
@@ -121,6 +130,37 @@ impl<M> DivGrad<M> {
         Ok(())
     }
 
+    /// What the diffusivities change in the report of the Laplacian.
+    fn certify<const D: usize>(
+        &self,
+        row: &Stencil<D>,
+        w: &[[f64; 1]],
+        diagonal: &[f64; 1],
+        mut report: RowReport,
+    ) -> Result<RowReport> {
+        let general = RowReport::of(row, w, diagonal);
+        (report.sum_abs, report.spectral_bound) = (general.sum_abs, general.spectral_bound);
+        let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
+        for q in row.sources().iter().map(|&q| q as usize).chain(row.center()) {
+            let d = self.diffusivity_of(q)?;
+            (low, high) = (low.min(d), high.max(d));
+        }
+        report.contrast = if high > low { high / low } else { 1.0 };
+        // Without a negative weight every eigenvalue lies in a Gershgorin disc left of zero, whatever the contrast.
+        let free = report.order.is_none_or(|order| order > 2) && report.negative_weights > 0;
+        report.growing = free && self.mean == Mean::Arithmetic && report.contrast > CONTRAST_LIMIT;
+        Ok(report)
+    }
+
+    /// Turns a row of the Laplacian, where there is one, into a row of this operator.
+    fn finish<const D: usize>(&self, draft: &mut Draft<D, [f64; 1]>) {
+        let Ok(report) = draft.report.clone() else { return };
+        draft.report = self
+            .scale(&draft.stencil, &mut draft.weights, &mut draft.diagonal)
+            .and_then(|()| draft.finite())
+            .and_then(|()| self.certify(&draft.stencil, &draft.weights, &draft.diagonal, report));
+    }
+
     fn diffusivity_of(&self, q: usize) -> Result<f64> {
         let found = self.diffusivity.len();
         self.diffusivity.get(q).copied().ok_or_else(|| OperatorError::Length { found, index: q }.into())
@@ -159,9 +199,24 @@ impl<M: Method<D, Out = [f64; 1]>, const D: usize> Method<D> for DivGrad<M> {
     }
 
     fn report(&self, row: &Stencil<D>, scratch: &M::Scratch, w: &[[f64; 1]], diagonal: &[f64; 1]) -> Result<RowReport> {
-        let mut report = self.laplacian.report(row, scratch, w, diagonal)?;
-        let general = RowReport::of(row, w, diagonal);
-        (report.sum_abs, report.spectral_bound) = (general.sum_abs, general.spectral_bound);
-        Ok(report)
+        self.certify(row, w, diagonal, self.laplacian.report(row, scratch, w, diagonal)?)
+    }
+
+    fn weights_batch(&self, drafts: &mut [Draft<D, [f64; 1]>], scratch: &mut M::Scratch) {
+        self.laplacian.weights_batch(drafts, scratch);
+        drafts.iter_mut().for_each(|draft| self.finish(draft));
+    }
+
+    fn growths(&self) -> u32 {
+        self.laplacian.growths()
+    }
+
+    fn can_grow(&self, refusal: &Error) -> bool {
+        self.laplacian.can_grow(refusal)
+    }
+
+    fn stand_in(&self, draft: &mut Draft<D, [f64; 1]>, scratch: &mut M::Scratch) {
+        self.laplacian.stand_in(draft, scratch);
+        self.finish(draft);
     }
 }

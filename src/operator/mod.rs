@@ -19,7 +19,7 @@ mod typed;
 pub use allowance::{Allowance, Targets};
 pub use contraction::{Contraction, ContractionScratch};
 pub use dcpse::{CUTOFF_OVER_EPSILON, DcPse, DcPseScratch, Fallback};
-pub use div_grad::{DivGrad, Mean};
+pub use div_grad::{CONTRAST_LIMIT, DivGrad, Mean};
 pub use draft::Draft;
 pub(crate) use draft::finite;
 pub use expression::{Expression, Operator, Outputs, ShowSum, Value};

@@ -52,6 +52,12 @@ pub struct RowReport {
     /// The bound this row sets on the modulus of the eigenvalues of the operator, in units of the operator.
     #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub spectral_bound: f64,
+    /// Largest over smallest diffusivity of the stencil, see [`DivGrad`](crate::DivGrad); 1 where there is none, infinite
+    /// beside an insulator.
+    pub contrast: f64,
+    /// Whether modes may grow: [`Mean::Arithmetic`](crate::Mean) across a contrast above 10, at an order above 2 and with
+    /// weights of both signs.
+    pub growing: bool,
     /// The limit this row breaks, if any.
     pub breach: Option<Breach>,
     /// Whether the caller allowed this row to break it.
@@ -84,6 +90,8 @@ impl RowReport {
             sum_abs,
             negative_weights: 0,
             spectral_bound: 2.0 * sum_abs,
+            contrast: 1.0,
+            growing: false,
             breach: None,
             allowed: false,
         }
