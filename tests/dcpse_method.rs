@@ -49,7 +49,7 @@ fn promises_hold_in_space_and_with_one_cutoff_for_all() {
     let nearest = |k: usize| Nearest::build(&particles, &Domain::open(), k).unwrap();
     keeps(Laplacian::<3>, 2, 2, &nearest(45));
     keeps(Gradient::<3>, 1, 2, &nearest(24));
-    let one = DcPse::<Laplacian<3>, 2>::new().cutoff(&particles).unwrap();
+    let one = DcPse::<Laplacian<3>, 2>::new().impose_zeroth().cutoff(&particles).unwrap();
     keeps(Laplacian::<3>, 2, 2, &CellList::build(&particles, &Domain::open(), one).unwrap());
     keeps(D3::<1, 1, 1>::default(), 3, 1, &nearest(60));
 }

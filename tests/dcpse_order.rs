@@ -32,88 +32,80 @@ fn holds<const D: usize, const K: usize, T: Field>(
     }
 }
 
-/// Every derivative of degree at most 2 in one and two dimensions; `wave` and `targets` as in [`Series`].
-fn every_operator<T: Field>(set: Set, order: u32, even: bool, wave: [f64; 2], targets: usize, sides: [Vec<usize>; 2]) {
-    let [line, plane] = sides;
-    let on = |wave: f64, sides: &[usize]| Series {
-        set,
-        even,
-        order,
-        sides: sides.to_vec(),
-        wave,
-        targets,
-        seeds: 5,
-        faces: true,
-    };
-    for degree in 0..=2 {
-        let wave = wave[usize::from(degree == 2)];
-        match degree {
-            0 => holds::<1, 1, T>(OfDegree::<1>(0), &on(wave, &line)),
-            1 => holds::<1, 1, T>(OfDegree::<1>(1), &on(wave, &line)),
-            _ => holds::<1, 1, T>(OfDegree::<1>(2), &on(wave, &line)),
-        }
-        match degree {
-            0 => holds::<2, 1, T>(OfDegree::<1>(0), &on(wave, &plane)),
-            1 => holds::<2, 2, T>(OfDegree::<2>(1), &on(wave, &plane)),
-            _ => holds::<2, 3, T>(OfDegree::<3>(2), &on(wave, &plane)),
-        }
-    }
+/// The order of every derivative of degree at most 2 on a line; the waves are those of degrees 0 and 1, and of 2.
+fn on_line<T: Field>(series: Series, wave: [f64; 2]) {
+    let at = |wave: f64| Series { wave, ..series.clone() };
+    holds::<1, 1, T>(OfDegree::<1>(0), &at(wave[0]));
+    holds::<1, 1, T>(OfDegree::<1>(1), &at(wave[0]));
+    holds::<1, 1, T>(OfDegree::<1>(2), &at(wave[1]));
 }
 
-/// Targets a set in the plane; in one dimension every particle is one.
-const TARGETS: usize = 400;
+/// As [`on_line`], in the plane.
+fn in_plane<T: Field>(series: Series, wave: [f64; 2]) {
+    let at = |wave: f64| Series { wave, ..series.clone() };
+    holds::<2, 1, T>(OfDegree::<1>(0), &at(wave[0]));
+    holds::<2, 2, T>(OfDegree::<2>(1), &at(wave[0]));
+    holds::<2, 3, T>(OfDegree::<3>(2), &at(wave[1]));
+}
+
+/// The wave is set later; all particles of a line are targets.
+fn series<const D: usize>(set: Set, order: u32, even: bool, sides: Vec<usize>) -> Series {
+    let targets = [usize::MAX, 400, 200][D - 1];
+    Series { set, even, order, sides, wave: 0.0, targets, seeds: 5, faces: true }
+}
 
 #[test]
 fn order_on_jittered_and_boundary_sets_is_the_design_order() {
     for set in [Set::Jittered, Set::Boundary] {
-        every_operator::<f64>(set, 2, false, [0.3; 2], TARGETS, [sides::<1>(), sides::<2>()]);
-        every_operator::<f64>(set, 4, false, [0.7; 2], TARGETS, [sides::<1>(), sides::<2>()]);
+        for (order, wave) in [(2, 0.3), (4, 0.7)] {
+            on_line::<f64>(series::<1>(set, order, false, sides::<1>()), [wave; 2]);
+            in_plane::<f64>(series::<2>(set, order, false, sides::<2>()), [wave; 2]);
+        }
     }
 }
 
 #[test]
 fn order_with_one_cutoff_for_all_is_the_design_order() {
-    every_operator::<f64>(Set::Jittered, 2, true, [0.3; 2], TARGETS, [sides::<1>(), sides::<2>()]);
-    every_operator::<f64>(Set::Jittered, 4, true, [0.7; 2], TARGETS, [sides::<1>(), sides::<2>()]);
+    for (order, wave) in [(2, 0.3), (4, 0.7)] {
+        on_line::<f64>(series::<1>(Set::Jittered, order, true, sides::<1>()), [wave; 2]);
+        in_plane::<f64>(series::<2>(Set::Jittered, order, true, sides::<2>()), [wave; 2]);
+    }
 }
 
 #[test]
 fn order_of_single_precision_fields_is_the_design_order() {
     // Above their floor, eps32 sum |w| epsilon^-|beta|, errors span a factor of 2 in h only, and waves are shorter.
-    let sides = || [vec![32, 40, 51, 64], vec![24, 30, 38, 48]];
-    every_operator::<f32>(Set::Jittered, 2, false, [0.8, 1.2], usize::MAX, sides());
-    every_operator::<f32>(Set::Jittered, 4, false, [1.2, 1.5], usize::MAX, sides());
-    // With 2 l neighbors each, the few corners of a square lead the norm over its faces, and 5 sets of seeds leave the
-    // order in doubt by 0.2 over so short a span; with one cutoff for all, corners weigh no more than edges.
-    every_operator::<f32>(Set::Boundary, 2, true, [0.5, 0.7], usize::MAX, sides());
-    every_operator::<f32>(Set::Boundary, 4, true, [0.7, 0.9], usize::MAX, sides());
+    let all = |series: Series| Series { targets: usize::MAX, ..series };
+    for set in [Set::Jittered, Set::Boundary] {
+        for (order, wave) in [(2, [0.8, 1.2]), (4, [1.2, 1.5])] {
+            on_line::<f32>(series::<1>(set, order, false, vec![32, 40, 51, 64]), wave);
+        }
+    }
+    let plane = vec![24, 30, 38, 48];
+    for (order, wave) in [(2, [0.8, 1.2]), (4, [1.2, 1.5])] {
+        in_plane::<f32>(all(series::<2>(Set::Jittered, order, false, plane.clone())), wave);
+    }
+    // With 2 l neighbors each, the few corners of a square lead the norm over its faces, and 5 seeds leave the order in
+    // doubt by 0.2 over so short a span; with one cutoff for all, corners weigh no more than edges.
+    for (order, wave) in [(2, [0.4, 0.5]), (4, [0.8, 0.95])] {
+        in_plane::<f32>(all(series::<2>(Set::Boundary, order, true, vec![24, 28, 33, 39])), wave);
+    }
 }
 
 #[test]
 fn odd_orders_on_lattices_with_whole_shells_are_one_higher() {
     for order in [1, 3] {
-        let series = |sides| Series {
-            set: Set::Lattice,
-            even: false,
-            order,
-            sides,
-            wave: 0.4,
-            targets: 200,
-            seeds: 1,
-            faces: true,
-        };
-        holds::<1, 1, f64>(OfDegree::<1>(1), &series(sides::<1>()));
-        holds::<1, 1, f64>(OfDegree::<1>(2), &series(sides::<1>()));
-        holds::<2, 2, f64>(OfDegree::<2>(1), &series(sides::<2>()));
-        holds::<2, 3, f64>(OfDegree::<3>(2), &series(sides::<2>()));
+        let one = |series: Series| Series { seeds: 1, ..series };
+        on_line::<f64>(one(series::<1>(Set::Lattice, order, false, sides::<1>())), [0.4; 2]);
+        in_plane::<f64>(one(series::<2>(Set::Lattice, order, false, sides::<2>())), [0.4; 2]);
     }
 }
 
 #[test]
 fn order_of_second_derivatives_in_space_is_the_design_order() {
-    for (order, wave, targets) in [(2, 0.3, 200), (4, 0.7, 120)] {
+    for (order, wave) in [(2, 0.3), (4, 0.7)] {
         for set in [Set::Jittered, Set::Boundary] {
-            let series = Series { set, even: false, order, sides: sides::<3>(), wave, targets, seeds: 5, faces: true };
+            let series = Series { wave, targets: 150, ..series::<3>(set, order, false, sides::<3>()) };
             holds::<3, 1, f64>(Laplacian::<3>, &series);
             holds::<3, 6, f64>(OfDegree::<6>(2), &series);
         }
@@ -122,20 +114,8 @@ fn order_of_second_derivatives_in_space_is_the_design_order() {
 
 #[test]
 fn order_on_quasi_random_sets_is_the_design_order() {
-    // Such a set is locally a lattice that changes with N, and the constant of the error with it: many numbers.
-    let sides: Vec<usize> = (0..28).map(|i| (24.0 * 4.0_f64.powf(f64::from(i) / 27.0)).round() as usize).collect();
     for (order, wave) in [(2, 0.3), (4, 0.7)] {
-        let series = Series {
-            set: Set::QuasiRandom,
-            even: false,
-            order,
-            sides: sides.clone(),
-            wave,
-            targets: 60,
-            seeds: 5,
-            faces: true,
-        };
-        holds::<2, 2, f64>(OfDegree::<2>(1), &series);
-        holds::<2, 3, f64>(OfDegree::<3>(2), &series);
+        on_line::<f64>(series::<1>(Set::QuasiRandom, order, false, sides::<1>()), [wave; 2]);
+        in_plane::<f64>(series::<2>(Set::QuasiRandom, order, false, sides::<2>()), [wave; 2]);
     }
 }

@@ -176,9 +176,9 @@ fn solves_after_the_first_allocate_nothing() -> parops::Result<()> {
     let matrix = parops::CsrMatrix::from_triplets(n, n, (0..n).flat_map(chain))?;
     let factors = parops::Ilu0::new(&matrix)?;
     let mut gmres = parops::Gmres::new().restart(4);
-    let mut solvers = vec![parops::SparseSolver::gmres(matrix.clone(), gmres.clone())?];
-    #[cfg(feature = "faer")]
-    solvers.push(parops::SparseSolver::lu(matrix.clone())?);
+    // The second is a sparse LU with the feature `faer`.
+    let solvers =
+        [parops::SparseSolver::gmres(matrix.clone(), gmres.clone())?, parops::SparseSolver::new(matrix.clone())?];
     let mut x = vec![0.0; n];
     let (easy, hard): (Vec<f64>, Vec<f64>) = (0..n).map(|i| (1.0, (i as f64).sin())).unzip();
     gmres.solve(&matrix, Some(&factors), &easy, &mut x)?;

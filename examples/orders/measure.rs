@@ -26,7 +26,8 @@ impl<const D: usize, const K: usize> Operator<D> for OfDegree<K> {
 #[derive(Clone)]
 pub struct Series {
     pub set: Set,
-    /// One cutoff for all, `DcPse::cutoff`, in place of the 2 l nearest neighbors of each, whole shells.
+    /// One cutoff for all, `DcPse::cutoff`, in place of the 2 l nearest neighbors of each, whole shells; orders are then
+    /// in that cutoff.
     pub even: bool,
     pub order: u32,
     /// Particles along an axis, the coarsest set first; the order is fitted over all.
@@ -140,11 +141,13 @@ pub fn observe<const D: usize, const K: usize, T: Field>(
             let particles = series.set.particles::<D>(side, seed)?;
             let (targets, weights) = stratified(&particles, radius, series, seed);
             let places: Vec<[f64; D]> = targets.iter().map(|&p| particles.points()[p]).collect();
-            let h = series.set.spacing::<D>(side, particles.len());
+            let even = if series.even { Some(dcpse.cutoff(&particles)?) } else { None };
+            // The cutoff that serves every particle of a set is not quite in proportion to its spacing.
+            let h = even.map_or(series.set.spacing::<D>(side, particles.len()), |cutoff| cutoff.0);
             let target =
                 Target { particles: &particles, targets: &targets, weights: &weights, terms: &terms, degree, kappa, h };
-            points.push(if series.even {
-                let cells = CellList::build_at(&places, &particles, &Domain::open(), dcpse.cutoff(&particles)?)?;
+            points.push(if let Some(cutoff) = even {
+                let cells = CellList::build_at(&places, &particles, &Domain::open(), cutoff)?;
                 target.measure::<K, T>(&dcpse, &Chosen::new(cells, targets.clone()), &mut outcome)?
             } else {
                 // A place finds its own particle too.

@@ -1,6 +1,6 @@
 //! The particle sets in the unit box, and the targets taken from them.
 
-use parops::{Neighbors, Particles};
+use parops::{Neighbors, Particles, Random};
 
 /// How particles are placed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,7 +9,8 @@ pub enum Set {
     Lattice,
     /// Displaced from a lattice by up to 0.3 h.
     Jittered,
-    /// A Kronecker sequence of the generalized golden ratio.
+    /// A Kronecker sequence in one dimension, Halton points beyond, where a Kronecker set is locally a lattice: its
+    /// stencils are almost symmetric, by a share that changes with N, and odd orders come out between r and r + 1.
     QuasiRandom,
     /// As jittered, with the outermost particles on the faces themselves.
     Boundary,
@@ -44,7 +45,8 @@ impl Set {
         match self {
             Self::Lattice => Particles::lattice(lower, upper, [side; D]),
             Self::Jittered => Particles::jittered(lower, upper, [side; D], JITTER, seed),
-            Self::QuasiRandom => Particles::quasi_random(lower, upper, side.pow(D as u32), seed),
+            Self::QuasiRandom if D == 1 => Particles::quasi_random(lower, upper, side, seed),
+            Self::QuasiRandom => Particles::new(halton(side.pow(D as u32), seed)),
             Self::Boundary => {
                 // One cell more than gaps: the middles of the outermost cells are the faces.
                 let h = 1.0 / (side - 1) as f64;
@@ -62,6 +64,22 @@ impl Set {
             }
         }
     }
+}
+
+/// Halton points, the radical inverses of 1, 2, ... in bases 2, 3 and 5, shifted at random and wrapped into the box.
+fn halton<const D: usize>(count: usize, seed: u64) -> Vec<[f64; D]> {
+    let mut random = Random::new(seed);
+    let shift: [f64; D] = std::array::from_fn(|_| random.uniform());
+    let inverse = |mut i: usize, base: usize| {
+        let (mut value, mut digit) = (0.0, 1.0);
+        while i > 0 {
+            digit /= base as f64;
+            value += digit * (i % base) as f64;
+            i /= base;
+        }
+        value
+    };
+    (1..=count).map(|i| std::array::from_fn(|axis| (inverse(i, [2, 3, 5][axis]) + shift[axis]).fract())).collect()
 }
 
 /// Some particles of a set as targets, each its own center.

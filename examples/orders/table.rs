@@ -90,10 +90,10 @@ const TITLE: &str = "# Observed orders of DC-PSE
 
 Written by `cargo run --release --example orders`. Default settings, the 2 l nearest neighbors of every particle, whole
 shells. Fields are plane waves in several directions, errors are those of interior particles, whose stencil touches no
-face of the unit box, unless a column says otherwise. Orders are fitted over 4 grids (28 numbers of particles on
-quasi-random sets, whose local lattice changes with N), medians of 5 seeds (1 on lattices).
+face of the unit box, unless a column says otherwise. Orders are fitted over 4 grids, medians of 5 seeds (1 on lattices).
 
-Sets: lattice; jittered by up to 0.3 h; quasi-random (Kronecker sequence); boundary (jittered, the outermost particles on
+Sets: lattice; jittered by up to 0.3 h; quasi-random (Kronecker sequence in 1D, Halton points in 2D and 3D, where a
+Kronecker set is locally a lattice whose symmetry changes with N); boundary (jittered, the outermost particles on
 the faces). l conditions, n neighbors in the mean. Error/floor is the least ratio of an interior L2 error to its round-off
 floor eps sum |w| epsilon^-|beta|. Bands: interior L2 within 0.1 of r for even r and 0.2 for odd, and of r + 1 for odd r on
 lattices; L-inf at least r - 0.35 for even r; on sets that are no lattice at most r + 0.5 for even r and r + 1.2 for odd;

@@ -174,7 +174,11 @@ impl<const D: usize> BatchSystem<D> {
         let groups = scratch.nodes.groups();
         for (i, (w, n)) in w.into_iter().zip(counts).enumerate().filter(|(_, (_, n))| *n > 0) {
             for (w, weights) in w.chunks_exact_mut(n).zip(scratch.weights.chunks_exact(groups)) {
-                for (w, weight) in w.iter_mut().zip(weights.iter().flatten()) {
+                let (full, rest) = w.as_chunks_mut::<GROUP>();
+                for (w, group) in full.iter_mut().zip(weights) {
+                    *w = group.map(|weight| weight.0[i]);
+                }
+                for (w, weight) in rest.iter_mut().zip(weights[full.len()..].iter().flatten()) {
                     *w = weight.0[i];
                 }
             }
@@ -202,14 +206,17 @@ impl<const D: usize> BatchSystem<D> {
     fn fill<const L: usize>(&self, layout: Layout, scratch: &mut BatchScratch<L>) {
         let BatchScratch { moments, matrix, norms, scales, .. } = scratch;
         matrix.clear();
-        matrix.extend(self.entries.iter().map(|pair| pair.map(|entry| moments[entry as usize])));
         matrix.resize(layout.len(), [Lanes::ZERO; 2]);
+        for (pair, &[even, odd]) in matrix.iter_mut().zip(&self.entries) {
+            pair[0] = moments[even as usize];
+            pair[1] = moments[odd as usize];
+        }
         norms.clear();
         scales.clear();
         for j in 0..self.conditions {
             let square = matrix[layout.diagonal(j)][j % 2];
             norms.push(square.map(power_above_root));
-            scales.push(square.map(|square| 1.0 / power_above_root(square)));
+            scales.push(square.map(|square| inverse_power(power_above_root(square))));
         }
         norms.resize(layout.columns(), Lanes::ZERO);
         scales.resize(layout.columns(), Lanes::ZERO);
@@ -321,10 +328,18 @@ fn take_row<const L: usize>(layout: Layout, k: usize, scratch: &mut BatchScratch
 /// 2^(floor(e/2) + 1).
 #[inline(always)]
 fn power_above_root(x: f64) -> f64 {
-    const BIAS: u64 = 1023;
     let halved = ((x.to_bits() >> 52) + 1) >> 1;
     f64::from_bits((halved + BIAS.div_ceil(2)) << 52)
 }
+
+/// 1/p of a power of two, from its exponent.
+#[inline(always)]
+fn inverse_power(p: f64) -> f64 {
+    f64::from_bits(((2 * BIAS) << 52).wrapping_sub(p.to_bits()))
+}
+
+/// Of the exponents of `f64`.
+const BIAS: u64 = 1023;
 
 #[cfg(test)]
 mod tests;

@@ -42,12 +42,15 @@ impl<const L: usize> Nodes<L> {
         let (full, groups) = (shortest / GROUP, longest.div_ceil(GROUP));
         let blank = [Lanes::ZERO; GROUP];
         self.places.clear();
-        self.places.reserve(groups * D);
-        for group in 0..full {
-            let place = |q: usize, axis: usize| Lanes(std::array::from_fn(|i| z[i][group * GROUP + q][axis]));
-            self.places.extend((0..D).map(|axis| std::array::from_fn(|q| place(q, axis))));
-        }
         self.places.resize(groups * D, blank);
+        for (group, places) in self.places.chunks_exact_mut(D).take(full).enumerate() {
+            for q in 0..GROUP {
+                let here = z.map(|z| z[group * GROUP + q]);
+                for (axis, place) in places.iter_mut().enumerate() {
+                    place[q] = Lanes(here.map(|z| z[axis]));
+                }
+            }
+        }
         for (i, z) in z.iter().enumerate() {
             let ragged = self.places.chunks_exact_mut(D).zip(z.chunks(GROUP)).skip(full);
             for (places, z) in ragged {
@@ -57,17 +60,18 @@ impl<const L: usize> Nodes<L> {
             }
         }
         self.windows.clear();
-        for places in self.places.chunks_exact(D) {
-            self.windows.push(std::array::from_fn(|q| {
+        self.windows.resize(groups, blank);
+        for (values, places) in self.windows.iter_mut().zip(self.places.chunks_exact(D)) {
+            for (q, value) in values.iter_mut().enumerate() {
                 let squared = places.iter().fold(Lanes::ZERO, |sum, place| sum + place[q] * place[q]);
-                match window {
+                *value = match window {
                     Window::Exponential => exp(Lanes::ZERO - squared),
                     Window::Wendland => squared.zip(Lanes(radius), |squared, radius| {
                         let root = window.root(squared, radius);
                         root * root
                     }),
-                }
-            }));
+                };
+            }
         }
         for (i, z) in z.iter().enumerate() {
             let all = self.windows.iter_mut().flatten();

@@ -149,16 +149,25 @@ fn hand_out<const D: usize, const K: usize>(
 ) -> Result<()> {
     // epsilon^-m comes last: it alone can overflow.
     let scale = (0..degree).fold(1.0, |product, _| product * inverse);
-    let sigma = pairing.sigma();
-    let mut diagonal = 0.0;
-    for (i, ((w, &sign), &solved)) in job.w.iter_mut().zip(job.row.signs()).zip(column).enumerate() {
-        let weight = solved * scale;
-        let (on_difference, share) = spread(weight, sigma * weight, sign);
-        if !on_difference.is_finite() {
-            return Err(OperatorError::Weight { q: job.row.sources()[i] as usize, weight }.into());
+    let (signs, mut diagonal, mut finite) = (job.row.signs(), 0.0, true);
+    if pairing == Pairing::Difference && signs.iter().all(|&sign| sign == 1) {
+        // Nothing is left for the diagonal, and no sum makes one weight wait for another.
+        for (w, &solved) in job.w.iter_mut().zip(column) {
+            w[k] = solved * scale;
+            finite &= w[k].is_finite();
         }
-        w[k] = on_difference;
-        diagonal += share;
+    } else {
+        let sigma = pairing.sigma();
+        for ((w, &sign), &solved) in job.w.iter_mut().zip(signs).zip(column) {
+            let weight = solved * scale;
+            let (on_difference, share) = spread(weight, sigma * weight, sign);
+            w[k] = on_difference;
+            diagonal += share;
+            finite &= on_difference.is_finite();
+        }
+    }
+    if !finite && let Some((w, &q)) = job.w.iter().zip(job.row.sources()).find(|(w, _)| !w[k].is_finite()) {
+        return Err(OperatorError::Weight { q: q as usize, weight: w[k] }.into());
     }
     if let (Pairing::Sum, Some(own)) = (pairing, column.get(job.row.len())) {
         diagonal += 2.0 * own * scale;
