@@ -3,12 +3,11 @@
 
 mod stencils;
 
-use nalgebra::DMatrix;
 use parops::{
     CUTOFF_OVER_EPSILON, D1, D2, D3, DcPse, Domain, Epsilon, ErrorKind, Gradient, Laplacian, Nearest, Neighbors,
-    Operator, OperatorError, ParticleError, Particles, Random, Window,
+    Operator, OperatorError, ParticleError, Particles, Random,
 };
-use stencils::{Stencils, candidates, length, moments, monomials, terms};
+use stencils::{Stencils, candidates, condition, length, moments, monomials, terms};
 
 /// What became of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -197,19 +196,6 @@ fn verdict<const D: usize, const K: usize, Op: Operator<D, Out = [f64; K]> + Clo
         assert!(residual <= 30.0 * unit * found.terms, "{residual:e} {:e} {terms:?}", found.terms);
     }
     Verdict::Accepted
-}
-
-/// cond(B) of the windowed, scaled monomials by singular values.
-fn condition<const D: usize>(z: &[[f64; D]], odd: bool, low: u32, high: u32) -> f64 {
-    let mut z = z.to_vec();
-    if odd {
-        z.push([0.0; D]);
-    }
-    let (alphas, columns) = monomials(&z, low, high);
-    let root = |z: &[f64; D]| Window::Exponential.root(length(z).powi(2), f64::NAN);
-    let b = DMatrix::from_fn(z.len(), alphas.len(), |i, j| columns[j][i] * root(&z[i]));
-    let values = b.singular_values();
-    values.max() / values.min()
 }
 
 const SCALES: [f64; 3] = [1.0, 1e-40, 1e40];

@@ -8,9 +8,8 @@ mod stencils;
 
 use std::collections::BTreeMap;
 
-use nalgebra::DMatrix;
-use parops::{CUTOFF_OVER_EPSILON, DcPse, MultiIndex, Operator, Random, Row, Window, graded};
-use stencils::{Moments, Stencils, candidates, length, moments, monomials, terms};
+use parops::{CUTOFF_OVER_EPSILON, DcPse, MultiIndex, Operator, Random, Row, graded};
+use stencils::{Moments, Stencils, candidates, condition, length, moments, monomials, terms};
 
 fn cases() -> usize {
     std::env::var("PAROPS_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(1000)
@@ -40,19 +39,6 @@ impl<const D: usize, const K: usize> Operator<D> for OfDegree<K> {
     fn terms(&self, term: &mut dyn FnMut(usize, MultiIndex<D>, f64)) {
         graded(self.0, self.0).enumerate().for_each(|(k, beta)| term(k, beta, 1.0));
     }
-}
-
-/// cond(B) of the windowed, scaled monomials by singular values.
-fn condition<const D: usize>(z: &[[f64; D]], odd: bool, low: u32, high: u32) -> f64 {
-    let mut z = z.to_vec();
-    if odd {
-        z.push([0.0; D]);
-    }
-    let (alphas, columns) = monomials(&z, low, high);
-    let root = |z: &[f64; D]| Window::Exponential.root(length(z).powi(2), f64::NAN);
-    let b = DMatrix::from_fn(z.len(), alphas.len(), |i, j| columns[j][i] * root(&z[i]));
-    let values = b.singular_values();
-    values.max() / values.min()
 }
 
 /// Builds rows on stencils within the default cutoff and epsilon 1, those refused left out, and looks at every one.
@@ -182,11 +168,14 @@ fn size<const D: usize>(degree: u32, order: u32) -> (usize, usize) {
     (l, 2 * l)
 }
 
-/// Runs `each` in batches of stencils for every order, K derivatives of one degree.
+/// What is done with a row: its order, what was found so far, the offsets of its neighbors, the row.
+type Look<'a, const D: usize, const K: usize> = dyn FnMut(u32, &mut Found, &[[f64; D]], &Row<'_, [f64; K]>) + 'a;
+
+/// Makes stencils and looks at their rows, batch after batch, for every order; K derivatives of one degree.
 fn every<const D: usize, const K: usize>(
     degree: u32,
     make: &mut dyn FnMut(usize, &mut Random) -> Vec<[f64; D]>,
-    look: &mut dyn FnMut(u32, &mut Found, &[[f64; D]], &Row<'_, [f64; K]>),
+    look: &mut Look<'_, D, K>,
     name: &str,
 ) {
     for order in 1..=8 {

@@ -1,8 +1,8 @@
 //! The same bits, and the same first error, whatever the number of threads.
 
 use parops::{
-    Allowance, Apply, CellList, Domain, Epsilon, Error, Exchange, Face, Gradient, Laplacian, Method, PairScratch,
-    Particles, Pse, Random, Report, Result, RowReport, Rows, Sign, Stencil, Strided,
+    Allowance, Apply, CellList, Cutoff, DcPse, Domain, Epsilon, Error, Exchange, Face, Gradient, Laplacian, Method,
+    PairScratch, Particles, Pse, Random, Report, Result, RowReport, Rows, Sign, Stencil, Strided,
 };
 
 /// More rows than three blocks of work hold, with all kinds of faces.
@@ -17,6 +17,8 @@ struct Bits {
     rows: Rows,
     single: Rows<[f64; 1], f32>,
     gradient: Rows<[f64; 2]>,
+    corrected: Rows,
+    corrected_gradient: Rows<[f64; 2]>,
     free: Report,
     applied: Vec<Vec<u64>>,
 }
@@ -33,6 +35,11 @@ fn work(particles: &Particles<2>, domain: &Domain<2>) -> Bits {
     let single = Rows::<_, f32>::assemble(&laplacian, &neighbors).unwrap();
     let gradient = gradient.assemble(&neighbors).unwrap();
     let free = laplacian.matrix_free(&neighbors).unwrap();
+    let near = CellList::build(particles, domain, Cutoff(4.0 / 45.0)).unwrap();
+    let corrected = DcPse::<Laplacian<2>, 4>::new();
+    let corrected_free = corrected.matrix_free(&near).unwrap();
+    let (corrected, corrected_gradient) =
+        (corrected.assemble(&near).unwrap(), DcPse::<Gradient<2>, 3>::new().assemble(&near).unwrap());
 
     let n = particles.len();
     let mut random = Random::new(8);
@@ -63,8 +70,12 @@ fn work(particles: &Particles<2>, domain: &Domain<2>) -> Bits {
     applied.push(short.iter().map(|x| u64::from(x.to_bits())).collect());
     free.apply(&f32s, &mut short).unwrap();
     applied.push(short.iter().map(|x| u64::from(x.to_bits())).collect());
+    corrected.apply(&f, &mut out).unwrap();
+    applied.push(bits(&out));
+    corrected_free.apply(&f, &mut out).unwrap();
+    applied.push(bits(&out));
     let free = *free.report();
-    Bits { rows, single, gradient, free, applied }
+    Bits { rows, single, gradient, corrected, corrected_gradient, free, applied }
 }
 
 /// PSE that refuses some targets, the first of them late in the second block.

@@ -13,6 +13,8 @@ impl Series {
             // The gaps of a Kronecker sequence are similar at Fibonacci numbers only.
             (1, Set::QuasiRandom) => [55, 89, 144, 233],
             (1, _) => [64, 102, 161, 256],
+            // Halton points fill the square evenly where their number is 2^a 3^b.
+            (2, Set::QuasiRandom) => [24, 36, 72, 96],
             (2, _) => [24, 38, 60, 96],
             _ => [16, 24, 36, 54],
         };
@@ -26,7 +28,7 @@ impl Series {
             sides: sides.to_vec(),
             wave: wave(degree, order),
             targets,
-            seeds: if set == Set::Lattice { 1 } else { SEEDS },
+            seeds: if set == Set::Lattice { 1 } else if set == Set::QuasiRandom { 25 } else { SEEDS },
             faces: true,
         }
     }
@@ -40,6 +42,7 @@ fn wave(degree: u32, order: u32) -> f64 {
         (2 | 3, _) => 0.3,
         (4, _) => 0.7,
         (_, 0 | 1) => 0.9,
-        _ => 1.0,
+        (_, 2) => 1.0,
+        _ => 1.05,
     }
 }

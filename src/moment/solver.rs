@@ -109,10 +109,14 @@ impl<T: Scalar> Solution<T> {
             && absolute <= eps.sqrt() * largest
     }
 
-    /// Whether it is also as small as QR leaves it, 16 eps max_alpha sum_q |w_q z_q^alpha|: what is asked of the cheaper
-    /// methods before the next is tried; for l conditions and max|b|. Without l: rounding of a sum grows with its terms, not with their number.
+    /// Whether it is also about as small as QR leaves it: what is asked of the cheaper methods before the next is tried;
+    /// for l conditions and max|b|. At most 16 eps max_alpha sum_q |w_q z_q^alpha|, without l, since rounding of a sum
+    /// grows with its terms, not with their number; and 4 eps times these where that is above 2^11 eps max|b|, 4.5e-13,
+    /// so that second derivatives of order 4 on half-stencils stay below 1e-12 too.
     pub(crate) fn is_sharp(&self, conditions: usize, largest: T) -> bool {
-        let sharp = T::lift(16.0) * T::default_epsilon() * self.residual.terms;
+        let eps = T::default_epsilon();
+        let terms = eps * self.residual.terms;
+        let sharp = (T::lift(16.0) * terms).min((T::lift(2048.0) * eps * largest).max(T::lift(4.0) * terms));
         self.is_within(conditions, largest) && self.residual.absolute <= sharp
     }
 }
