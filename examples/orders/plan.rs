@@ -28,7 +28,13 @@ impl Series {
             sides: sides.to_vec(),
             wave: wave(degree, order),
             targets,
-            seeds: if set == Set::Lattice { 1 } else if set == Set::QuasiRandom { 25 } else { SEEDS },
+            seeds: if set == Set::Lattice {
+                1
+            } else if set == Set::QuasiRandom {
+                25
+            } else {
+                SEEDS
+            },
             faces: true,
         }
     }
