@@ -3,7 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use parops::{
-    Allowance, Apply, ApplyError, BruteForce, CellList, Cutoff, D2, Domain, Epsilon, Error, ErrorKind, Euler,
+    Allowance, Apply, ApplyError, BruteForce, CellList, Cutoff, D2, Domain, Draft, Epsilon, Error, ErrorKind, Euler,
     Expression, Gaussian, Gradient, Kernel, KernelError, Laplacian, MatrixFree, Method, MultiIndex, MultiIndexError,
     Neighbor, NeighborError, NeighborList, Neighbors, OperatorError, ParticleError, Particles, Plan, Policy, Pse,
     Result, Rk4, RowReport, Rows, Sign, Sph, SphForm, Stencil, StepLimit, Stepper, Term, TimeError, Volumes, integrate,
@@ -358,7 +358,7 @@ impl Method<2> for Careless {
     }
     fn report(&self, row: &Stencil<2>, _: &(), w: &[[f64; 1]], diagonal: &[f64; 1]) -> Result<RowReport> {
         let mut report = RowReport::of(row, w, diagonal);
-        report.moment_defect = f64::NAN;
+        (report.moment_defect, report.condition, report.residual) = (f64::NAN, f64::NAN, f64::NAN);
         Ok(report)
     }
 }
@@ -378,9 +378,131 @@ fn weights_of_a_foreign_method_that_are_no_numbers_are_refused_and_unknown_defec
     }
     let rows = Rows::<[f64; 1]>::assemble(&Careless(1.0), &neighbors)?;
     assert!(rows.report().moment_defect.is_nan(), "a defect nobody knows is not the best of all");
+    assert!(rows.report().condition.is_nan() && rows.report().residual.is_nan());
     assert_eq!(rows.report().worst().map(|worst| worst.target), Some(0));
     assert_eq!(rows.targets(), particles.len());
     Ok(())
+}
+
+/// A provider that gathers rows of another target, or counts beyond all bounds.
+struct Astray<'a> {
+    cells: &'a CellList<2>,
+    shift: usize,
+    counted: Option<usize>,
+    targets: usize,
+}
+
+impl Neighbors<2> for Astray<'_> {
+    fn targets(&self) -> usize {
+        self.targets
+    }
+    fn sources(&self) -> usize {
+        self.cells.sources()
+    }
+    fn center(&self, p: usize) -> Option<usize> {
+        self.cells.center(p)
+    }
+    fn cutoff(&self, p: usize) -> f64 {
+        self.cells.cutoff(p)
+    }
+    fn reach(&self) -> f64 {
+        self.cells.reach()
+    }
+    fn generation(&self) -> u64 {
+        0
+    }
+    fn for_each(&self, p: usize, cutoff: f64, visit: impl FnMut(Neighbor<2>)) {
+        self.cells.for_each(p, cutoff, visit);
+    }
+    fn gather(&self, p: usize, cutoff: f64, row: &mut Stencil<2>) {
+        row.reset(p + self.shift, self.center(p), cutoff);
+        self.for_each(p, cutoff, |neighbor| row.push(neighbor));
+    }
+    fn count(&self, p: usize, cutoff: f64) -> usize {
+        self.counted.unwrap_or_else(|| self.cells.count(p, cutoff))
+    }
+}
+
+#[test]
+fn providers_that_lead_astray_are_refused_and_never_panic() -> Result<()> {
+    let (particles, _, neighbors, _) = rows();
+    let fair = Astray { cells: &neighbors, shift: 0, counted: None, targets: particles.len() };
+    assert!(Rows::<[f64; 1]>::assemble(&Careless(1.0), &fair).is_ok());
+    for shift in [1, 1000] {
+        let astray = Astray { shift, ..fair };
+        let stored = Rows::<[f64; 1]>::assemble(&Careless(1.0), &astray).unwrap_err();
+        assert_eq!(stored, Error::new(NeighborError::Misnamed { found: shift }).at(0));
+        assert_eq!(MatrixFree::new(&Careless(1.0), &astray).err(), Some(stored));
+    }
+    let endless = [Astray { counted: Some(usize::MAX / 2), ..fair }, Astray { targets: usize::MAX, ..fair }];
+    for astray in endless {
+        let error = Rows::<[f64; 1]>::assemble(&Careless(1.0), &astray).unwrap_err();
+        assert_eq!(*error.kind(), ErrorKind::Particle(ParticleError::Memory { count: usize::MAX }));
+    }
+    Ok(())
+}
+
+/// A method that leaves its drafts in disorder.
+struct Untidy(fn(&mut Draft<2, [f64; 1]>));
+
+impl Method<2> for Untidy {
+    type Out = [f64; 1];
+    type Scratch = ();
+
+    fn scratch(&self) -> Result<()> {
+        Ok(())
+    }
+    fn weights(&self, row: &Stencil<2>, _: &mut (), w: &mut [[f64; 1]], diagonal: &mut [f64; 1]) -> Result<()> {
+        Careless(1.0).weights(row, &mut (), w, diagonal)
+    }
+    fn report(&self, row: &Stencil<2>, _: &(), w: &[[f64; 1]], diagonal: &[f64; 1]) -> Result<RowReport> {
+        Careless(1.0).report(row, &(), w, diagonal)
+    }
+    fn weights_batch(&self, drafts: &mut [Draft<2, [f64; 1]>], scratch: &mut ()) {
+        Careless(1.0).weights_batch(drafts, scratch);
+        drafts.iter_mut().for_each(|draft| self.0(draft));
+    }
+}
+
+fn widened(draft: &mut Draft<2, [f64; 1]>) {
+    if let Ok(report) = &mut draft.report {
+        report.grown = 1;
+    }
+}
+
+#[test]
+fn methods_that_leave_disorder_are_refused_and_never_panic() {
+    let (.., neighbors, _) = rows();
+    assert_eq!(neighbors.sources(), 256, "the index below names none");
+    let untidy: [fn(&mut Draft<2, [f64; 1]>); 6] = [
+        |draft| draft.weights.truncate(1),
+        |draft| draft.weights.push([1.0]),
+        |draft| draft.stencil.reset(100_000, None, 1.0),
+        |draft| {
+            widened(draft);
+            draft.stencil.reset(1, Some(1), 1.0);
+            draft.weights.clear();
+        },
+        |draft| {
+            widened(draft);
+            draft.stencil.reset(draft.stencil.target(), None, 1.0);
+        },
+        |draft| {
+            widened(draft);
+            draft.stencil.push(Neighbor { q: 256, separation: [0.0; 2], sign: 1 });
+            draft.weights.push([1.0]);
+        },
+    ];
+    for (i, untidy) in untidy.into_iter().enumerate() {
+        let stored = Rows::<[f64; 1]>::assemble(&Untidy(untidy), &neighbors).unwrap_err();
+        assert_eq!(MatrixFree::new(&Untidy(untidy), &neighbors).err(), Some(stored.clone()));
+        assert_eq!(stored.particle(), Some(0));
+        match *stored.kind() {
+            ErrorKind::Operator(OperatorError::Draft { .. }) => assert!(i < 5),
+            ErrorKind::Neighbor(NeighborError::Source { q: 256, sources: 256 }) => assert_eq!(i, 5),
+            ref other => panic!("{i}: {other}"),
+        }
+    }
 }
 
 /// A kernel whose support, terms or values are none.

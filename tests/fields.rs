@@ -170,3 +170,16 @@ fn pse_rows_take_fields_too() -> Failure {
     )?)?);
     Ok(())
 }
+
+#[test]
+fn strides_of_nothing_lead_nowhere() {
+    let particles = Particles::<2>::new(Vec::new()).unwrap();
+    let neighbors = parops::BruteForce::build(&particles, &Domain::open(), Cutoff(0.3)).unwrap();
+    let rows = DcPse::<Laplacian<2>, 2>::new().assemble(&neighbors).unwrap();
+    let (f, mut out): ([f64; 0], [f64; 0]) = ([], []);
+    for fields in [16, usize::MAX] {
+        let shape = ([0, fields], [1, usize::MAX]);
+        let (f, out) = (Strided::new(&f[..], shape.0, shape.1), Strided::new(&mut out[..], shape.0, shape.1));
+        rows.apply_strided(f.unwrap(), out.unwrap()).unwrap();
+    }
+}

@@ -1,8 +1,8 @@
 //! Rows that are refused at first: wider supports, what stands in for them, and what the report and the error say.
 
 use parops::{
-    Apply, CellList, Cutoff, DcPse, Domain, ErrorKind, Expression, Fallback, GROWTH, Gradient, Laplacian, MultiIndex,
-    Nearest, OperatorError, Particles, Random, Rows, Several, Sign,
+    Apply, CellList, Cutoff, DcPse, Domain, Epsilon, ErrorKind, Expression, Fallback, GROWTH, Gradient, Histogram,
+    Laplacian, MultiIndex, Nearest, Neighbors, OperatorError, Particles, Random, Rows, Several, Sign,
 };
 
 type Failure = Result<(), parops::Error>;
@@ -38,7 +38,6 @@ fn supports_grow_until_the_row_is_certified_and_the_report_counts_them() -> Fail
     assert!(report.grown >= 3 && report.grown < 40, "{}", report.grown);
     assert_eq!((report.lowered, report.empty, report.order), (0, 0, Some(2)));
     // More pairs than the cutoffs of the provider hold, and all of them where they belong.
-    use parops::Neighbors;
     let counted: usize = (0..particles.len()).map(|p| neighbors.count(p, neighbors.cutoff(p))).sum();
     assert!(report.pairs > counted);
     assert_eq!(report.pairs, (0..particles.len()).map(|p| rows.row(p).unwrap().sources.len()).sum::<usize>());
@@ -222,4 +221,85 @@ fn histograms_and_worst_rows_tell_the_same_as_the_extremes() -> Failure {
     let worst: Vec<f64> = report.worst_rows().map(|row| row.condition).collect();
     assert!(worst.len() == 8 && worst[0] == report.condition && worst.is_sorted_by(|a, b| a >= b));
     Ok(())
+}
+
+#[test]
+fn epsilons_of_the_caller_end_the_growth_where_the_window_ends() -> Failure {
+    let particles = four_lines();
+    let dcpse = DcPse::<Laplacian<2>, 4>::new();
+    let neighbors = Nearest::build(&particles, &Domain::open(), dcpse.fewest_neighbors::<2>()?)?;
+    // Twice, once, and not at all until cutoff/epsilon is above 6.
+    for (ratio, grown) in [(4.4, 2), (5.0, 1), (5.9, 0)] {
+        let epsilon = Epsilon::each((0..240).map(|p| neighbors.cutoff(p) / ratio).collect())?;
+        let dcpse = dcpse.clone().epsilon(epsilon);
+        let error = dcpse.assemble(&neighbors).unwrap_err();
+        assert!(matches!(error.kind(), ErrorKind::Operator(OperatorError::Uncertified { .. })), "{error}");
+        assert_eq!(error.wanted_cutoff(), None, "a wider provider cannot help");
+        let rows = dcpse.clone().fallback(Fallback::LowerOrder).assemble(&neighbors)?;
+        let worst = rows.report().worst().unwrap();
+        assert_eq!((rows.report().lowered, worst.grown), (240, grown));
+        assert_eq!(worst.order.map(|order| order + worst.lowered), Some(4));
+        let wide = GROWTH.powi(grown as i32) * (1.0 + f64::EPSILON).powi(4) * neighbors.cutoff(worst.target);
+        assert_eq!(worst.neighbors, neighbors.count(worst.target, wide));
+        let empty = dcpse.fallback(Fallback::Empty).assemble(&neighbors)?;
+        assert_eq!(empty.report().empty, 240);
+    }
+    Ok(())
+}
+
+#[test]
+fn outputs_are_certified_each_on_its_own_scale() -> Failure {
+    // d^2/dy^2 does not exist on a line, however small its factor; d^2/dx^2 does.
+    let line: Vec<[f64; 2]> = (0..40).map(|i| [0.1 * f64::from(i) + 0.01 * f64::from(i * i % 7), 0.5]).collect();
+    let particles = Particles::new(line)?;
+    let neighbors = CellList::build(&particles, &Domain::open(), Cutoff(2.5))?;
+    let scaled = |index, factor| Expression::new([(MultiIndex::new(index), factor)]);
+    for factor in [1.0, 1e-14, 1e-300] {
+        let operators = Several([scaled([2, 0], 1.0)?, scaled([0, 2], factor)?]);
+        let error = DcPse::<_, 2>::of(operators).assemble(&neighbors).unwrap_err();
+        assert!(matches!(error.kind(), ErrorKind::Operator(OperatorError::Uncertified { .. })), "{factor}: {error}");
+    }
+    // Powers of two change nothing but themselves.
+    let particles = Particles::jittered([0.0; 2], [1.0; 2], [15; 2], 0.3, 9)?;
+    let neighbors = CellList::build(&particles, &Domain::open(), Cutoff(0.3))?;
+    let factors = [1.0, -2.0_f64.powi(-60), 2.0_f64.powi(500)];
+    let several = Several([scaled([2, 0], factors[0])?, scaled([1, 1], factors[1])?, scaled([0, 2], factors[2])?]);
+    let plain = Several([scaled([2, 0], 1.0)?, scaled([1, 1], 1.0)?, scaled([0, 2], 1.0)?]);
+    let several = DcPse::<_, 2>::of(several).assemble(&neighbors)?;
+    let plain = DcPse::<_, 2>::of(plain).assemble(&neighbors)?;
+    for p in 0..particles.len() {
+        for (scaled, plain) in several.row(p).unwrap().weights.iter().zip(plain.row(p).unwrap().weights) {
+            assert_eq!(*scaled, std::array::from_fn(|k| plain[k] * factors[k]));
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn sets_too_small_for_an_operator_are_told_its_conditions() {
+    let particles = Particles::jittered([0.0; 2], [1.0; 2], [4; 2], 0.3, 1).unwrap();
+    let error = DcPse::<Laplacian<2>, 2>::new().cutoff(&particles).unwrap_err();
+    let few = OperatorError::TooFew { neighbors: 15, conditions: 9, needed: 18 };
+    assert_eq!(*error.kind(), ErrorKind::Operator(few));
+}
+
+#[test]
+fn histograms_count_powers_of_ten_from_below_and_what_is_not_positive_as_small() {
+    let edge = |x: f64| {
+        let mut one = Histogram::default();
+        one.add(x);
+        one.decades().next().unwrap().0
+    };
+    let power = |exponent: i32| format!("1e{exponent}").parse::<f64>().unwrap();
+    for exponent in -32..=31 {
+        let x = power(exponent);
+        assert_eq!([edge(x), edge(x.next_up())], [x; 2]);
+        assert_eq!(edge(x.next_down()), power((exponent - 1).max(-32)));
+    }
+    for small in [0.0, -0.0, -1.0, f64::NEG_INFINITY, f64::MIN_POSITIVE, 5e-324] {
+        assert_eq!(edge(small), 1e-32, "{small:e}");
+    }
+    for large in [1e32, f64::INFINITY, f64::NAN] {
+        assert_eq!(edge(large), 1e31, "{large:e}");
+    }
 }

@@ -136,14 +136,44 @@ where
     if curves.iter().all(|curve| curve.name.is_empty()) {
         return Ok(());
     }
+    let (columns, rows) = chart.plotting_area().get_pixel_range();
+    let middle = ((columns.start + columns.end) / 2, (rows.start + rows.end) / 2);
+    let drawn: Vec<(i32, i32)> = curves
+        .iter()
+        .flat_map(|curve| dense(&curve.points, axes.logarithmic))
+        .map(|p| chart.backend_coord(&p))
+        .collect();
+    // The corner that fewest points share with the legend.
+    let hidden = |&(_, left, low): &(SeriesLabelPosition, bool, bool)| {
+        drawn.iter().filter(|p| (p.0 < middle.0) == left && (p.1 > middle.1) == low).count()
+    };
+    let corners = [
+        (SeriesLabelPosition::LowerLeft, true, true),
+        (SeriesLabelPosition::UpperRight, false, false),
+        (SeriesLabelPosition::LowerRight, false, true),
+        (SeriesLabelPosition::UpperLeft, true, false),
+    ];
+    let position = corners.into_iter().min_by_key(hidden).map_or(SeriesLabelPosition::UpperRight, |corner| corner.0);
     chart
         .configure_series_labels()
-        .position(if axes.logarithmic { SeriesLabelPosition::LowerLeft } else { SeriesLabelPosition::UpperRight })
+        .position(position)
         .background_style(WHITE.mix(0.85))
         .border_style(BLACK.mix(0.3))
         .label_font(("sans-serif", 15))
         .draw()?;
     Ok(())
+}
+
+/// Points along a curve, a few between any two of its own.
+fn dense(points: &[(f64, f64)], logarithmic: bool) -> impl Iterator<Item = (f64, f64)> {
+    let between = move |a: f64, b: f64, t: f64| if logarithmic { a * (b / a).powf(t) } else { a + (b - a) * t };
+    points
+        .windows(2)
+        .flat_map(move |pair| {
+            let [a, b] = [pair[0], pair[1]];
+            (0..=8).map(move |i| f64::from(i) / 8.0).map(move |t| (between(a.0, b.0, t), between(a.1, b.1, t)))
+        })
+        .filter(|p| p.0.is_finite() && p.1.is_finite())
 }
 
 fn legend<'a>(x: i32, y: i32, mark: Mark, color: RGBColor) -> DynElement<'static, SVGBackend<'a>, (i32, i32)> {

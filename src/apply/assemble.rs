@@ -3,10 +3,10 @@
 use super::blocks::{BLOCK, each_block};
 use super::rows::{Centers, Rows};
 use super::splice::Stray;
-use super::worker::{BATCH, Worker, cutoff};
+use super::worker::{BATCH, Workers, cutoff};
 use super::{Field, MatrixFree, Report};
 use crate::domain::Domain;
-use crate::error::{Error, NeighborError, OperatorError, Result};
+use crate::error::{Error, NeighborError, OperatorError, ParticleError, Result};
 use crate::kernel::{Kernel, SmoothingKernel};
 use crate::moment::MomentSolver;
 use crate::neighbors::{CellList, Neighbors};
@@ -23,6 +23,8 @@ impl<S: Outputs, T: Field> Rows<S, T> {
     /// # Errors
     /// [`NeighborError::Reach`] naming the target whose cutoff is beyond the provider; [`NeighborError::Source`] and
     /// [`NeighborError::Offsets`] for a provider that names sources it does not have or counts others than it gathers;
+    /// [`NeighborError::Misnamed`] and [`OperatorError::Draft`] for a provider and a method that leave another row than
+    /// the one asked for;
     /// [`ParticleError::Memory`](crate::ParticleError::Memory) where the rows do not fit; what the method refuses;
     /// [`OperatorError::Weight`] where a weight is not finite, in `f64` or rounded to `T`; and
     /// [`OperatorError::Overlap`] or [`OperatorError::Moment`] naming the worst row that breaks a limit without leave.
@@ -43,16 +45,18 @@ impl<S: Outputs, T: Field> Rows<S, T> {
             weights: &mut weights,
             diagonal: &mut diagonal,
         };
+        let workers = Workers::new();
         let made = each_block(blocks, |mut block| {
-            let mut worker = Worker::new(method)?;
-            let (mut report, mut strays) = (Report::default(), Vec::new());
-            let past = block.first + block.diagonal.len();
-            for first in (block.first..past).step_by(BATCH) {
-                for draft in worker.rows(method, neighbors, first..past.min(first + BATCH))? {
-                    strays.extend(block.store(&offsets, draft, &mut report)?);
+            workers.with(method, |worker| {
+                let (mut report, mut strays) = (Report::default(), Vec::new());
+                let past = block.first + block.diagonal.len();
+                for first in (block.first..past).step_by(BATCH) {
+                    for draft in worker.rows(method, neighbors, first..past.min(first + BATCH))? {
+                        strays.extend(block.store(&offsets, draft, &mut report)?);
+                    }
                 }
-            }
-            Ok((report, strays))
+                Ok((report, strays))
+            })
         })?;
         let (mut report, mut strays) = (Report::default(), Vec::new());
         for (block, found) in made {
@@ -81,7 +85,7 @@ fn filled<V: Copy>(count: usize, value: V) -> Result<Vec<V>> {
 /// Where each row begins.
 fn count<const D: usize, M: Method<D>, P: Neighbors<D>>(method: &M, neighbors: &P) -> Result<Vec<usize>> {
     let targets = neighbors.targets();
-    let mut offsets = filled(targets + 1, 0_usize)?;
+    let mut offsets = filled(targets.saturating_add(1), 0_usize)?;
     each_block(offsets[1..].chunks_mut(BLOCK).enumerate(), |(b, counts)| {
         for (i, count) in counts.iter_mut().enumerate() {
             let p = b * BLOCK + i;
@@ -89,9 +93,9 @@ fn count<const D: usize, M: Method<D>, P: Neighbors<D>>(method: &M, neighbors: &
         }
         Ok(())
     })?;
-    let mut sum = 0;
+    let mut sum = 0_usize;
     for offset in &mut offsets {
-        sum += *offset;
+        sum = sum.checked_add(*offset).ok_or(ParticleError::Memory { count: usize::MAX })?;
         *offset = sum;
     }
     Ok(offsets)
@@ -265,7 +269,7 @@ impl<Op, const R: u32, S: MomentSolver> DcPse<Op, R, S> {
     where
         Op: Operator<D>,
     {
-        let needed = self.fewest_neighbors()?;
+        let (conditions, needed) = (self.most_conditions()?, self.fewest_neighbors()?);
         let h = particles.spacing()?.0;
         // A ball of radius r holds about (2 r/h)^D / 2 lattice points, for D = 1 to 3 within a factor of 1.3.
         let mut cutoff = 0.5 * h * (2.0 * needed as f64).powf(1.0 / D as f64);
@@ -277,7 +281,7 @@ impl<Op, const R: u32, S: MomentSolver> DcPse<Op, R, S> {
                 return Ok(Cutoff(cutoff));
             }
             if fewest + 1 == particles.len() {
-                let kind = OperatorError::TooFew { neighbors: fewest, conditions: needed, needed };
+                let kind = OperatorError::TooFew { neighbors: fewest, conditions, needed };
                 return Err(Error::from(kind).at(p));
             }
             cutoff *= 1.15;

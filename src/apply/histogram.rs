@@ -3,7 +3,7 @@
 /// Number of rows per decade of a figure.
 ///
 /// Bin i counts the rows with 10^(i - 32) <= x < 10^(i - 31); the first bin takes what is smaller, zero included, the
-/// last what is larger, NaN included.
+/// last what is larger, NaN included; what is negative counts as small.
 ///
 /// ```
 /// use parops::Histogram;
@@ -78,6 +78,9 @@ fn bin(x: f64) -> usize {
     if !(x < EDGES[BINS - 1]) {
         return BINS - 1;
     }
+    if x < EDGES[1] {
+        return 0;
+    }
     // The binary exponent names the decade but for one, without a logarithm.
     let exponent = (x.to_bits() >> 52) as i32 - 1023;
     let decade = ((exponent * 315_653) >> 20) - LOWEST;
@@ -85,19 +88,11 @@ fn bin(x: f64) -> usize {
     guess + usize::from(guess + 1 < BINS && x >= EDGES[guess + 1])
 }
 
-/// Lower edges of the bins.
-const EDGES: [f64; BINS] = {
-    let mut edges = [1.0; BINS];
-    let one = -LOWEST as usize;
-    let mut power = 1.0;
-    let mut i = 0;
-    while i <= one {
-        edges[one - i] = 1.0 / power;
-        if one + i < BINS {
-            edges[one + i] = power;
-        }
-        power *= 10.0;
-        i += 1;
-    }
-    edges
-};
+/// Lower edges of the bins; written out, because products of tens are not the nearest numbers.
+#[rustfmt::skip]
+const EDGES: [f64; BINS] = [
+    1e-32, 1e-31, 1e-30, 1e-29, 1e-28, 1e-27, 1e-26, 1e-25, 1e-24, 1e-23, 1e-22, 1e-21, 1e-20, 1e-19, 1e-18, 1e-17,
+    1e-16, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e0, 1e1,
+    1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21,
+    1e22, 1e23, 1e24, 1e25, 1e26, 1e27, 1e28, 1e29, 1e30, 1e31,
+];

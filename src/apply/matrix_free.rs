@@ -1,10 +1,8 @@
 //! An operator that stores no weights: right where a list of neighbors serves few applications.
 
-use std::sync::{Mutex, PoisonError};
-
 use super::blocks::{BLOCK, each_block, each_part};
 use super::sweep::Sweep;
-use super::worker::{BATCH, Worker};
+use super::worker::{BATCH, Workers};
 use super::{Apply, Field, Report, check, check_results, scalars};
 use crate::error::Result;
 use crate::neighbors::Neighbors;
@@ -19,7 +17,7 @@ pub struct MatrixFree<'a, const D: usize, M: Method<D>, P> {
     method: &'a M,
     pub(super) neighbors: &'a P,
     report: Report,
-    workers: Mutex<Vec<Worker<D, M>>>,
+    workers: Workers<D, M>,
 }
 
 impl<'a, const D: usize, M: Method<D>, P: Neighbors<D>> MatrixFree<'a, D, M, P> {
@@ -28,12 +26,12 @@ impl<'a, const D: usize, M: Method<D>, P: Neighbors<D>> MatrixFree<'a, D, M, P> 
     /// # Errors
     /// As [`Rows::assemble`](super::Rows::assemble).
     pub fn new(method: &'a M, neighbors: &'a P) -> Result<Self> {
-        let mut operator = Self { method, neighbors, report: Report::default(), workers: Mutex::default() };
+        let mut operator = Self { method, neighbors, report: Report::default(), workers: Workers::new() };
         let targets = neighbors.targets();
         method.validate(targets, neighbors.sources())?;
         let blocks = (0..targets).step_by(BLOCK).map(|first| first..targets.min(first + BLOCK));
         let reports = each_block(blocks, |rows| {
-            operator.with_worker(|worker| {
+            operator.workers.with(method, |worker| {
                 let mut report = Report::default();
                 for first in rows.clone().step_by(BATCH) {
                     for draft in worker.rows(method, neighbors, first..rows.end.min(first + BATCH))? {
@@ -52,17 +50,6 @@ impl<'a, const D: usize, M: Method<D>, P: Neighbors<D>> MatrixFree<'a, D, M, P> 
     pub fn report(&self) -> &Report {
         &self.report
     }
-
-    fn with_worker<R>(&self, work: impl FnOnce(&mut Worker<D, M>) -> Result<R>) -> Result<R> {
-        let spare = self.workers.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        let mut worker = match spare {
-            Some(worker) => worker,
-            None => Worker::new(self.method)?,
-        };
-        let result = work(&mut worker);
-        self.workers.lock().unwrap_or_else(PoisonError::into_inner).push(worker);
-        result
-    }
 }
 
 impl<const D: usize, const K: usize, M: Method<D, Out = [f64; K]>, P: Neighbors<D>> MatrixFree<'_, D, M, P> {
@@ -73,7 +60,7 @@ impl<const D: usize, const K: usize, M: Method<D, Out = [f64; K]>, P: Neighbors<
         row: impl Fn(usize, &Draft<D, [f64; K]>) -> T + Sync + Send,
     ) -> Result<()> {
         each_part(out, |first, out| {
-            self.with_worker(|worker| {
+            self.workers.with(self.method, |worker| {
                 for (p, out) in (first..).zip(out) {
                     *out = row(p, worker.row(self.method, self.neighbors, p)?);
                 }

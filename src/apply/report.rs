@@ -72,8 +72,8 @@ pub struct Report {
 }
 
 impl Report {
-    /// The rows that break their limits worst, the worst first; of rows that break none those with the largest moment
-    /// defect, then condition number. At most 8.
+    /// At most 8 rows, the worst first: those that break a limit without leave, then empty rows, then those of the lowest
+    /// order, then those that break a limit by most, then those with the largest moment defect, then condition number.
     pub fn worst_rows(&self) -> impl Iterator<Item = &RowReport> {
         self.worst.iter().flatten()
     }
@@ -96,8 +96,8 @@ impl Report {
         self.extremes([row.h_over_epsilon, row.moment_defect, row.lower_moment, row.sum_abs, row.spectral_bound]);
         self.negative_weights += row.negative_weights;
         self.allowed += usize::from(row.allowed);
-        self.condition = self.condition.max(row.condition);
-        self.residual = self.residual.max(row.residual);
+        self.condition = larger(self.condition, row.condition);
+        self.residual = larger(self.residual, row.residual);
         if let Some(rung) = row.rung {
             self.rungs[rung as usize] += 1;
             self.conditions.add(row.condition);
@@ -125,8 +125,8 @@ impl Report {
         self.extremes([next.h_over_epsilon, next.moment_defect, next.lower_moment, next.sum_abs, next.spectral_bound]);
         self.negative_weights += next.negative_weights;
         self.allowed += next.allowed;
-        self.condition = self.condition.max(next.condition);
-        self.residual = self.residual.max(next.residual);
+        self.condition = larger(self.condition, next.condition);
+        self.residual = larger(self.residual, next.residual);
         for (rows, next) in self.rungs.iter_mut().zip(next.rungs) {
             *rows += next;
         }
@@ -157,8 +157,8 @@ impl Report {
     fn rank(&mut self, row: &RowReport) {
         let key = |row: &RowReport| {
             let refused = row.breach.is_some() && !row.allowed;
-            let defect = if row.moment_defect.is_nan() { f64::INFINITY } else { row.moment_defect };
-            (refused, row.empty, row.lowered, row.severity(), defect, row.condition)
+            let known = |figure: f64| if figure.is_nan() { f64::INFINITY } else { figure };
+            (refused, row.empty, row.lowered, row.severity(), known(row.moment_defect), known(row.condition))
         };
         let ahead = |known: &Option<RowReport>| {
             known.is_none_or(|known| key(row).partial_cmp(&key(&known)) == Some(std::cmp::Ordering::Greater))

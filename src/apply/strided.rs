@@ -44,7 +44,10 @@ impl<T: Copy, S: Deref<Target = [T]>> Strided<S> {
         let particles_apart = apart(fields, strides[1], Some(0)) && apart(particles, strides[0], across);
         let end = along.zip(across).and_then(|(a, b)| a.checked_add(b));
         let inside = end.is_some_and(|end| end < data.len());
-        if particles == 0 || fields == 0 || (inside && (fields_apart || particles_apart)) {
+        if particles == 0 || fields == 0 {
+            // No stride is ever gone along.
+            Ok(Self { data, particles, fields, strides: [0; 2] })
+        } else if inside && (fields_apart || particles_apart) {
             Ok(Self { data, particles, fields, strides })
         } else {
             Err(ApplyError::Strides { particles, fields, strides, places: data.len() }.into())
@@ -119,7 +122,7 @@ fn all_finite<T: Field>(values: &[T]) -> bool {
 /// Applies the rows to all fields, as many at a time as fit a sweep.
 pub(super) fn sweep_fields<T: Field>(f: &Strided<&[T]>, out: &mut Strided<&mut [T]>, rows: &impl LaneRows<T>) {
     let mut first = 0;
-    while first < out.fields {
+    while out.particles > 0 && first < out.fields {
         first += match out.fields - first {
             // Of stacked fields every lane reads a cache line of its own: four at a time measured fastest.
             8.. if f.strides[1] == 1 => chunk::<T, 8>(f, out, first, rows),
@@ -142,7 +145,6 @@ fn chunk<T: Field, const C: usize>(
     rows: &impl LaneRows<T>,
 ) -> usize {
     let [particle, field] = out.strides;
-    // Without particles the strides may lead beyond the slice.
     let data = out.data.get_mut(first * field..).unwrap_or_default();
     let places: Places<'_, T, C> = if field > out.particles.saturating_sub(1) * particle {
         let mut lines = data.chunks_mut(field);

@@ -1,10 +1,12 @@
 //! One thread's part of making rows: gather, weights, and what is tried where a row is refused.
 
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
-use crate::error::{Error, NeighborError, Result};
+use crate::error::{Error, NeighborError, OperatorError, Result};
 use crate::neighbors::Neighbors;
 use crate::operator::{Draft, GROWTH, Method, Outputs};
+use crate::stencil::Stencil;
 
 /// Rows made side by side.
 pub(super) const BATCH: usize = 8;
@@ -15,8 +17,28 @@ pub(super) struct Worker<const D: usize, M: Method<D>> {
     scratch: M::Scratch,
 }
 
+/// As many workers as work at a time, kept from one block of rows to the next.
+pub(super) struct Workers<const D: usize, M: Method<D>>(Mutex<Vec<Worker<D, M>>>);
+
+impl<const D: usize, M: Method<D>> Workers<D, M> {
+    pub(super) fn new() -> Self {
+        Self(Mutex::default())
+    }
+
+    pub(super) fn with<R>(&self, method: &M, work: impl FnOnce(&mut Worker<D, M>) -> Result<R>) -> Result<R> {
+        let spare = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut worker = match spare {
+            Some(worker) => worker,
+            None => Worker::new(method)?,
+        };
+        let result = work(&mut worker);
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(worker);
+        result
+    }
+}
+
 impl<const D: usize, M: Method<D>> Worker<D, M> {
-    pub(super) fn new(method: &M) -> Result<Self> {
+    fn new(method: &M) -> Result<Self> {
         Ok(Self { drafts: vec![Draft::default(); BATCH], scratch: method.scratch()? })
     }
 
@@ -27,7 +49,8 @@ impl<const D: usize, M: Method<D>> Worker<D, M> {
         gather(neighbors, p, cutoff(method, neighbors, p)?, draft)?;
         if let Err(refusal) = method.weights(&draft.stencil, scratch, &mut draft.weights, &mut draft.diagonal) {
             draft.report = Err(refusal);
-            mend(method, neighbors, draft, scratch)?;
+            mend(method, neighbors, p, draft, scratch)?;
+            check_draft(p, neighbors.sources(), draft)?;
         }
         Ok(draft)
     }
@@ -41,12 +64,15 @@ impl<const D: usize, M: Method<D>> Worker<D, M> {
     ) -> Result<&[Draft<D, M::Out>]> {
         let Self { drafts, scratch } = self;
         let drafts = &mut drafts[..targets.len()];
-        for (p, draft) in targets.zip(drafts.iter_mut()) {
+        for (p, draft) in targets.clone().zip(drafts.iter_mut()) {
             gather(neighbors, p, cutoff(method, neighbors, p)?, draft)?;
         }
         method.weights_batch(drafts, scratch);
-        for draft in drafts.iter_mut().filter(|draft| draft.report.is_err()) {
-            mend(method, neighbors, draft, scratch)?;
+        for (p, draft) in targets.zip(drafts.iter_mut()) {
+            if draft.report.is_err() {
+                mend(method, neighbors, p, draft, scratch)?;
+            }
+            check_draft(p, neighbors.sources(), draft)?;
         }
         Ok(drafts)
     }
@@ -70,13 +96,32 @@ fn gather<const D: usize, S: Outputs, P: Neighbors<D>>(
     draft: &mut Draft<D, S>,
 ) -> Result<()> {
     neighbors.gather(p, cutoff, &mut draft.stencil);
-    let sources = neighbors.sources();
-    let named = draft.stencil.sources().iter().map(|&q| q as usize).chain(draft.stencil.center());
-    if let Some(q) = named.max().filter(|&q| q >= sources) {
-        return Err(Error::from(NeighborError::Source { q, sources }).at(p));
+    let found = draft.stencil.target();
+    if found != p {
+        return Err(Error::from(NeighborError::Misnamed { found }).at(p));
     }
+    check_sources(p, neighbors.sources(), &draft.stencil)?;
     draft.clear();
     Ok(())
+}
+
+fn check_sources<const D: usize>(p: usize, sources: usize, row: &Stencil<D>) -> Result<()> {
+    let named = row.sources().iter().fold(0, |most, &q| most.max(q)) as usize;
+    match named.max(row.center().unwrap_or(0)) {
+        q if q >= sources && (row.center().is_some() || !row.is_empty()) => {
+            Err(Error::from(NeighborError::Source { q, sources }).at(p))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Methods may reach into a draft as they like: what they leave must still be a row of p.
+fn check_draft<const D: usize, S: Outputs>(p: usize, sources: usize, draft: &Draft<D, S>) -> Result<()> {
+    let (target, neighbors, weights) = (draft.stencil.target(), draft.stencil.len(), draft.weights.len());
+    if target != p || weights != neighbors {
+        return Err(Error::from(OperatorError::Draft { target, neighbors, weights }).at(p));
+    }
+    check_sources(p, sources, &draft.stencil)
 }
 
 /// Widens the support of a refused row as often as the method wants and the provider reaches, then asks the method for
@@ -84,11 +129,11 @@ fn gather<const D: usize, S: Outputs, P: Neighbors<D>>(
 fn mend<const D: usize, M: Method<D>, P: Neighbors<D>>(
     method: &M,
     neighbors: &P,
+    p: usize,
     draft: &mut Draft<D, M::Out>,
     scratch: &mut M::Scratch,
 ) -> Result<()> {
-    let p = draft.stencil.target();
-    let mut grown = 0;
+    let (mut grown, mut limited) = (0, false);
     while grown < method.growths() {
         let (before, refusal) = (draft.stencil.cutoff(), draft.report.clone());
         let wider = (GROWTH * before).min(neighbors.reach());
@@ -104,8 +149,14 @@ fn mend<const D: usize, M: Method<D>, P: Neighbors<D>>(
                 report.grown = grown;
                 return Ok(());
             }
-            // An epsilon of its own may refuse the wider support for another reason: the first one is the one to name.
-            Err(other) if !method.can_grow(other) => draft.report = refusal,
+            Err(other) if !method.can_grow(other) => {
+                // An epsilon of its own may refuse the wider support for another reason: the row keeps the last support
+                // that was legal, and the refusal to name is that one's.
+                gather(neighbors, p, before, draft)?;
+                draft.report = refusal;
+                (grown, limited) = (grown - 1, true);
+                break;
+            }
             Err(_) => {}
         }
     }
@@ -116,7 +167,7 @@ fn mend<const D: usize, M: Method<D>, P: Neighbors<D>>(
             report.grown = grown;
             Ok(())
         }
-        Err(refusal) if method.can_grow(refusal) => Err(refusal.clone().wanting(wanted).at(p)),
+        Err(refusal) if method.can_grow(refusal) && !limited => Err(refusal.clone().wanting(wanted).at(p)),
         Err(refusal) => Err(refusal.clone().at(p)),
     }
 }

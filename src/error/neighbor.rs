@@ -56,6 +56,11 @@ kinds! {
             /// Number of sources.
             sources: usize,
         } => "neighbor {q} does not exist among {sources} sources",
+        /// A row that was gathered for another target than the one asked for.
+        Misnamed {
+            /// The target it names.
+            found: usize,
+        } => "the provider gathered the row of target {found}",
         /// The same image of the same source twice in one row.
         Repeated {
             /// The source.

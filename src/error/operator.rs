@@ -52,6 +52,15 @@ kinds! {
             /// The weight.
             weight: f64,
         } => "the weight of neighbor {q} is {weight}",
+        /// A draft that a method has left in disorder.
+        Draft {
+            /// The target its stencil names.
+            target: usize,
+            /// Number of neighbors in its stencil.
+            neighbors: usize,
+            /// Number of weights.
+            weights: usize,
+        } => "the method left {weights} weights for {neighbors} neighbors of target {target}",
         /// A moment system without a solution.
         Singular {
             /// Number of neighbors n.

@@ -13,7 +13,8 @@ use crate::error::{Error, LinearError, Result};
 /// Two methods: GMRES with ILU(0), and, with the feature `faer`, a sparse LU with partial pivoting. Rows are first scaled by
 /// powers of two to a largest entry in [1, 2), so that Dirichlet rows and rows of a Laplacian weigh alike; the relative
 /// residual |b - A x|_2 / |b|_2 of the *scaled* rows has to come below 1e-13 (or what a [`Gmres`] of the caller's asks),
-/// or below what rounding leaves of it, eps | (k + 1) (|A| |x| + |b|) |_2 / |b|_2 with the k entries of each row. Solving
+/// or below what rounding leaves of it, eps | (k + 1) (|A| |x| + |b|) |_2 / |b|_2 with the k entries of each row, but never
+/// above sqrt(eps). Solving
 /// allocates nothing after the first time.
 ///
 /// ```
@@ -167,14 +168,16 @@ impl SparseSolver {
     }
 }
 
-/// The relative residual that rounding leaves: eps | (k + 1) (|A| |x| + |b|) |_2 / |b|_2 with k entries in a row.
+/// The relative residual that rounding leaves: eps | (k + 1) (|A| |x| + |b|) |_2 / |b|_2 with k entries in a row, at most
+/// sqrt(eps).
 fn floor(matrix: &CsrMatrix, b: &[f64], x: &[f64], work: &mut [f64]) -> f64 {
     for (row, (work, b)) in work.iter_mut().zip(b).enumerate() {
         let (columns, values) = matrix.range(row);
         let products = columns.iter().zip(values).map(|(&q, value)| (value * x[q as usize]).abs());
         *work = (columns.len() as f64 + 1.0) * products.fold(b.abs(), |sum, product| sum + product);
     }
-    f64::EPSILON * ratio(work, b)
+    // A singular system has solutions so large that rounding would excuse any residual.
+    (f64::EPSILON * ratio(work, b)).min(f64::EPSILON.sqrt())
 }
 
 impl CsrMatrix {

@@ -1,7 +1,7 @@
 //! The moment systems of several targets, solved side by side and held to their gates.
 
 use super::Settings;
-use super::group::{Conditions, Group, Pairing};
+use super::group::{Column, Conditions, Group, Pairing};
 use crate::error::{Error, OperatorError, Result};
 use crate::moment::{BatchScratch, MomentScratch, MomentSolver, Rung, Solution};
 use crate::operator::method::spread;
@@ -100,8 +100,8 @@ pub(super) fn certify<S: MomentSolver, const D: usize, const K: usize, const L: 
             certificate.residual = certificate.residual.max(residual.absolute);
             certificate.rung = certificate.rung.max(Some(rung));
             certificate.negative += w.iter().filter(|&&w| w < 0.0).count();
-            for (&(k, degree), column) in outputs.iter().zip(w.chunks_exact(z.len())) {
-                hand_out(k, column, degree, inverse, pairing, &mut jobs[i])?;
+            for (&column, solved) in outputs.iter().zip(w.chunks_exact(z.len())) {
+                hand_out(column, solved, inverse, pairing, &mut jobs[i])?;
             }
             Ok(())
         };
@@ -138,17 +138,16 @@ fn nodes<const D: usize>(
     Ok(())
 }
 
-/// Turns the solved column of output k into its weights and its share of the diagonal.
+/// Turns a solved column into the weights of its output and its share of the diagonal.
 fn hand_out<const D: usize, const K: usize>(
-    k: usize,
+    Column { output: k, degree, scale }: Column,
     column: &[f64],
-    degree: u32,
     inverse: f64,
     pairing: Pairing,
     job: &mut Job<'_, D, K>,
 ) -> Result<()> {
     // epsilon^-m comes last: it alone can overflow.
-    let scale = (0..degree).fold(1.0, |product, _| product * inverse);
+    let scale = (0..degree).fold(scale, |product, _| product * inverse);
     let (signs, mut diagonal, mut finite) = (job.row.signs(), 0.0, true);
     if pairing == Pairing::Difference && signs.iter().all(|&sign| sign == 1) {
         // Nothing is left for the diagonal, and no sum makes one weight wait for another.

@@ -32,13 +32,25 @@ impl Pairing {
 /// Outputs whose exactness m + r and pairing agree (notes, after eq. 5.47).
 #[derive(Clone, Debug)]
 pub(super) struct Group<const D: usize> {
-    /// Output k of the operator and its degree m, for every right-hand side.
-    outputs: Vec<(usize, u32)>,
+    /// Whose weights each right-hand side gives.
+    outputs: Vec<Column>,
     pairing: Pairing,
     /// All conditions, the zeroth moment among them.
     plain: Conditions<D>,
     /// Those of '-' at a particle, where the zeroth moment is free.
     own: Option<Conditions<D>>,
+}
+
+/// One right-hand side of a group.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Column {
+    /// Which output of the operator it gives.
+    pub(super) output: usize,
+    /// Its degree m.
+    pub(super) degree: u32,
+    /// The power of two it was divided by. The outputs of a group are held to one bound on the residual, which a much
+    /// smaller output could miss entirely.
+    pub(super) scale: f64,
 }
 
 /// Conditions, as the solvers of one stencil and of many want them.
@@ -62,7 +74,7 @@ impl<const D: usize> Group<D> {
     }
 
     /// Outputs, conditions and pairing of a target that is a particle, or is none.
-    pub(super) fn at(&mut self, particle: bool) -> (&[(usize, u32)], &mut Conditions<D>, Pairing) {
+    pub(super) fn at(&mut self, particle: bool) -> (&[Column], &mut Conditions<D>, Pairing) {
         let Self { outputs, pairing, plain, own } = self;
         match own {
             Some(own) if particle => (outputs, own, *pairing),
@@ -107,14 +119,35 @@ pub(super) fn grouped<const D: usize, Op: Operator<D>>(
         }
         done.push((top, pairing));
         let members: Vec<usize> = (0..kinds.len()).filter(|&k| key(&kinds[k]) == (top, pairing)).collect();
-        let terms: Vec<Vec<Term<D>>> = members.iter().map(|&k| outputs[k].clone()).collect();
+        let mut terms: Vec<Vec<Term<D>>> = members.iter().map(|&k| outputs[k].clone()).collect();
+        let scales = balance(&mut terms);
         let plain = Conditions::new(&terms, top, order, 0)?;
         let own = match pairing {
             Pairing::Difference if !settings.impose_zeroth => Some(Conditions::new(&terms, top, order, 1)?),
             _ => None,
         };
-        let outputs = members.into_iter().map(|k| (k, kinds[k].0)).collect();
+        let column = |(output, scale): (usize, f64)| Column { output, degree: kinds[output].0, scale };
+        let outputs = members.into_iter().zip(scales).map(column).collect();
         groups.push(Group { outputs, pairing, plain, own });
     }
     Ok(groups)
+}
+
+/// Multiplies the terms of each output by a power of two, so that the largest factors of all have one exponent; returns
+/// what undoes it.
+fn balance<const D: usize>(outputs: &mut [Vec<Term<D>>]) -> Vec<f64> {
+    let exponent = |terms: &[Term<D>]| {
+        let largest = terms.iter().fold(0.0_f64, |largest, term| largest.max(term.factor.abs()));
+        (largest.is_normal()).then(|| (largest.to_bits() >> 52) as i32)
+    };
+    let top = outputs.iter().filter_map(|terms| exponent(terms)).max().unwrap_or(0);
+    let power = |exponent: i32| f64::from_bits(((1023 + exponent) as u64) << 52);
+    let mut scales = Vec::with_capacity(outputs.len());
+    for terms in outputs {
+        // Half the range of the exponents: neither the power nor its inverse is zero.
+        let below = exponent(terms).map_or(0, |own| (top - own).min(1000));
+        terms.iter_mut().for_each(|term| term.factor *= power(below));
+        scales.push(power(-below));
+    }
+    scales
 }

@@ -200,11 +200,16 @@ impl<Op, const R: u32, S> DcPse<Op, R, S> {
     where
         Op: Operator<D>,
     {
-        let conditions = grouped::<D, Op>(&self.operator, &self.settings, self.settings.order)?
-            .iter()
-            .map(|group| group.at_particle().conditions())
-            .max();
-        Ok(self.settings.fewest(conditions.unwrap_or(0)))
+        Ok(self.settings.fewest(self.most_conditions()?))
+    }
+
+    /// l of the largest system at a particle.
+    pub(crate) fn most_conditions<const D: usize>(&self) -> Result<usize>
+    where
+        Op: Operator<D>,
+    {
+        let groups = grouped::<D, Op>(&self.operator, &self.settings, self.settings.order)?;
+        Ok(groups.iter().map(|group| group.at_particle().conditions()).max().unwrap_or(0))
     }
 }
 
