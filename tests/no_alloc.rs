@@ -105,6 +105,9 @@ fn weights_into_given_scratch_allocate_nothing_once_a_row_of_that_size_was_made(
     let rows = count_weights(&pse, &neighbors);
     assert!(rows > 0);
     assert_eq!(rows, count_weights(&sph, &neighbors));
+    // Rows that the first solver does not certify go through the others: one of those was made by then too.
+    let dcpse = parops::DcPse::<Gradient<2>, 2>::new();
+    assert_eq!(rows, count_weights(&dcpse, &neighbors));
 }
 
 /// Makes the longest row, then all of them, and returns how many were made without an allocation: all.
