@@ -29,7 +29,7 @@ fn main() -> ExitCode {
     options::run("orders", matrix)
 }
 
-/// Orders r, all of them and those of a quick run.
+/// Orders r of the full matrix.
 const ORDERS: [u32; 5] = [1, 2, 3, 4, 6];
 
 /// Observes every order; whether all are within their bands.

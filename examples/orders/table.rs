@@ -95,7 +95,7 @@ lattices). In 2D each seed means 4 sets, so that the few corners, which lead the
 
 Sets: lattice; jittered by up to 0.3 h; quasi-random (Kronecker sequence in 1D, Halton points in 2D and 3D, where a
 Kronecker set is locally a lattice whose symmetry changes with N); boundary (jittered, the outermost particles on
-the faces). l conditions, n neighbors in the mean. Error/floor is the least ratio of an interior L2 error to its round-off
+the faces). l conditions, n neighbors in the mean. Error/floor is the least ratio of an L2 error, interior or face, to its round-off
 floor eps sum |w| epsilon^-|beta|. Bands: interior L2 within 0.1 of r for even r and 0.2 for odd, and of r + 1 for odd r on
 lattices; L-inf at least r - 0.35 for even r; on sets that are no lattice at most r + 0.5 for even r and r + 1.2 for odd;
 face at least r - 0.25 in 1D and 2D, r - 0.5 in 3D. The order over all particles is reported, never asserted. Grown rows
