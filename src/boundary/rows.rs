@@ -133,8 +133,9 @@ impl BoundaryRows {
     /// g(p) is the right side at particle p, a value of the moment where it depends on time.
     ///
     /// Values of Neumann and Robin particles stand in each other's rows: they are found together from one sparse system,
-    /// to a relative residual of 1e-13. What stands in u at boundary particles is not read. Where g is given for u
-    /// alone, u = g/a to the bit. Nothing is allocated after the first call.
+    /// to a relative residual of 1e-13, or what rounding leaves of it, see [`SparseSolver`](crate::SparseSolver). What
+    /// stands in u at boundary particles is not read. Where g is given for u alone, u = g/a to the bit. Nothing is
+    /// allocated after the first call.
     ///
     /// # Errors
     /// [`ApplyError::Input`] for a field of another length; [`BoundaryError::Value`] naming the particle where g is not
