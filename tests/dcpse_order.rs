@@ -51,7 +51,7 @@ fn in_plane<T: Field>(series: Series, wave: [f64; 2]) {
 /// The wave is set later; all particles of a line are targets.
 fn series<const D: usize>(set: Set, order: u32, even: bool, sides: Vec<usize>) -> Series {
     let targets = [usize::MAX, 400, 200][D - 1];
-    Series { set, even, order, sides, wave: 0.0, targets, seeds: 5, faces: true }
+    Series { set, even, order, sides, wave: 0.0, targets, seeds: 5, copies: 1, faces: true }
 }
 
 #[test]

@@ -37,6 +37,9 @@ pub struct Series {
     /// Targets taken among particles that may touch a face and among the others, on every set.
     pub targets: usize,
     pub seeds: u64,
+    /// Independent sets of equal spacing that the norms of one grid and seed are over: a set has few corners, which lead
+    /// the norm over its faces.
+    pub copies: u64,
     /// Whether particles whose stencil may touch a face are targets too.
     pub faces: bool,
 }
@@ -76,7 +79,14 @@ struct Sums {
     whole: Sum,
 }
 
-/// One output on one set.
+impl Sums {
+    fn point(self, h: f64) -> Point {
+        let [interior, face] = self.errors.map(|errors| errors.norms());
+        Point { h, interior, face, whole: self.whole.norms(), floors: self.floors.map(|floor| floor.norms().l2) }
+    }
+}
+
+/// One output on one grid.
 #[derive(Clone, Copy, Default)]
 struct Point {
     h: f64,
@@ -138,22 +148,28 @@ pub fn observe<const D: usize, const K: usize, T: Field>(
     for seed in 0..series.seeds {
         let mut points: Vec<[Point; K]> = Vec::new();
         for &side in &series.sides {
-            let particles = series.set.particles::<D>(side, seed)?;
-            let (targets, weights) = stratified(&particles, radius, series, seed);
-            let places: Vec<[f64; D]> = targets.iter().map(|&p| particles.points()[p]).collect();
-            let even = if series.even { Some(dcpse.cutoff(&particles)?) } else { None };
-            // The cutoff that serves every particle of a set is not quite in proportion to its spacing.
-            let h = even.map_or(series.set.spacing::<D>(side, particles.len()), |cutoff| cutoff.0);
-            let target =
-                Target { particles: &particles, targets: &targets, weights: &weights, terms: &terms, degree, kappa, h };
-            points.push(if let Some(cutoff) = even {
-                let cells = CellList::build_at(&places, &particles, &Domain::open(), cutoff)?;
-                target.measure::<K, T>(&dcpse, &Chosen::new(cells, targets.clone()), &mut outcome)?
-            } else {
-                // A place finds its own particle too.
-                let nearest = Nearest::build_at(&places, &particles, &Domain::open(), needed + 1)?;
-                target.measure::<K, T>(&dcpse, &Chosen::new(nearest, targets.clone()), &mut outcome)?
-            });
+            let mut sums: [Sums; K] = std::array::from_fn(|_| Sums::default());
+            let mut h = 0.0;
+            for copy in 0..series.copies {
+                let seed = seed * series.copies + copy;
+                let particles = series.set.particles::<D>(side, seed)?;
+                let (targets, weights) = stratified(&particles, radius, series, seed);
+                let places: Vec<[f64; D]> = targets.iter().map(|&p| particles.points()[p]).collect();
+                let target = Target { particles: &particles, targets: &targets, weights, terms: &terms, degree, kappa };
+                if series.even {
+                    let cutoff = dcpse.cutoff(&particles)?;
+                    let cells = CellList::build_at(&places, &particles, &Domain::open(), cutoff)?;
+                    target.measure::<K, T>(&dcpse, &Chosen::new(cells, targets.clone()), &mut sums, &mut outcome)?;
+                    // The cutoff that serves every particle of a set is not quite in proportion to its spacing.
+                    h += cutoff.0 / series.copies as f64;
+                } else {
+                    // A place finds its own particle too.
+                    let nearest = Nearest::build_at(&places, &particles, &Domain::open(), needed + 1)?;
+                    target.measure::<K, T>(&dcpse, &Chosen::new(nearest, targets.clone()), &mut sums, &mut outcome)?;
+                    h = series.set.spacing::<D>(side, particles.len());
+                }
+            }
+            points.push(sums.map(|sums| sums.point(h)));
         }
         let slope = |error: fn(&Point) -> f64, k: usize| slope(points.iter().map(|p| (p[k].h, error(&p[k]))));
         slopes.push(std::array::from_fn(|k| {
@@ -235,11 +251,10 @@ fn directions<const D: usize>() -> Vec<[f64; D]> {
 struct Target<'a, const D: usize> {
     particles: &'a Particles<D>,
     targets: &'a [usize],
-    weights: &'a [f64],
+    weights: Vec<f64>,
     terms: &'a [(usize, MultiIndex<D>, f64)],
     degree: u32,
     kappa: f64,
-    h: f64,
 }
 
 impl<const D: usize> Target<'_, D> {
@@ -247,12 +262,12 @@ impl<const D: usize> Target<'_, D> {
         &self,
         dcpse: &DcPse<impl Operator<D, Out = [f64; K]>>,
         neighbors: &impl Neighbors<D>,
+        sums: &mut [Sums; K],
         outcome: &mut Outcome<K>,
-    ) -> parops::Result<[Point; K]> {
+    ) -> parops::Result<()> {
         let rows: Rows<[f64; K], T> = Rows::assemble(dcpse, neighbors)?;
         outcome.grown += rows.report().grown;
         let squares = self.squares(&rows)?;
-        let mut sums: [Sums; K] = std::array::from_fn(|_| Sums::default());
         for (i, &p) in self.targets.iter().enumerate() {
             let cutoff = neighbors.cutoff(i);
             let inside = self.particles.points()[p].iter().all(|x| x - cutoff >= 0.0 && x + cutoff <= 1.0);
@@ -270,13 +285,7 @@ impl<const D: usize> Target<'_, D> {
                 sum.whole.add(self.weights[i], squares[i][k]);
             }
         }
-        Ok(sums.map(|Sums { errors: [interior, face], floors, whole }| Point {
-            h: self.h,
-            interior: interior.norms(),
-            face: face.norms(),
-            whole: whole.norms(),
-            floors: floors.map(|floor| floor.norms().l2),
-        }))
+        Ok(())
     }
 
     /// The squared modulus of the error of every row and output, the mean over the directions.

@@ -13,6 +13,8 @@ impl Series {
             // The gaps of a Kronecker sequence are similar at Fibonacci numbers only.
             (1, Set::QuasiRandom) => [55, 89, 144, 233],
             (1, _) => [64, 102, 161, 256],
+            // Between a wave too short for stencils at corners, 2.1 times as wide, and the floor there is little room.
+            (2, _) if (order, degree) == (6, 3) => [24, 36, 54, 72],
             // Halton points fill the square evenly where their number is 2^a 3^b.
             (2, Set::QuasiRandom) => [24, 36, 72, 96],
             (2, _) => [24, 38, 60, 96],
@@ -26,9 +28,10 @@ impl Series {
             even: false,
             order,
             sides: sides.to_vec(),
-            wave: wave(degree, order),
+            wave: wave::<D>(degree, order),
             targets,
-            seeds: if set == Set::Lattice { 1 } else if set == Set::QuasiRandom { 25 } else { SEEDS },
+            seeds: if set == Set::Lattice { 1 } else { SEEDS },
+            copies: if D == 2 && set != Set::Lattice { 4 } else { 1 },
             faces: true,
         }
     }
@@ -36,13 +39,14 @@ impl Series {
 
 /// kappa times the radius of the stencil on the coarsest set: small enough that the leading error leads, at faces too,
 /// where stencils are twice as wide; large enough that the finest set is far above rounding.
-fn wave(degree: u32, order: u32) -> f64 {
+fn wave<const D: usize>(degree: u32, order: u32) -> f64 {
     match (order, degree) {
         (1, _) => 0.1,
         (2 | 3, _) => 0.3,
         (4, _) => 0.7,
         (_, 0 | 1) => 0.9,
         (_, 2) => 1.0,
+        _ if D == 2 => 0.78,
         _ => 1.05,
     }
 }

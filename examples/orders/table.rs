@@ -90,7 +90,8 @@ const TITLE: &str = "# Observed orders of DC-PSE
 
 Written by `cargo run --release --example orders`. Default settings, the 2 l nearest neighbors of every particle, whole
 shells. Fields are plane waves in several directions, errors are those of interior particles, whose stencil touches no
-face of the unit box, unless a column says otherwise. Orders are fitted over 4 grids, medians of 5 seeds (1 on lattices).
+face of the unit box, unless a column says otherwise. Orders are fitted over 4 grids, medians of 5 seeds (1 on
+lattices). In 2D each seed means 4 sets, so that the few corners, which lead the norm over the faces, are more.
 
 Sets: lattice; jittered by up to 0.3 h; quasi-random (Kronecker sequence in 1D, Halton points in 2D and 3D, where a
 Kronecker set is locally a lattice whose symmetry changes with N); boundary (jittered, the outermost particles on

@@ -23,9 +23,11 @@ impl<S: Outputs, T: Field> Rows<S, T> {
             return Ok(());
         }
         let added: usize = strays.iter().map(|stray| stray.columns.len()).sum();
-        let memory = |_| ParticleError::Memory { count: added };
-        self.columns.try_reserve_exact(added).map_err(memory)?;
-        self.weights.try_reserve_exact(added).map_err(memory)?;
+        let room: usize = strays.iter().map(|stray| self.offsets[stray.p + 1] - self.offsets[stray.p]).sum();
+        let more = added.saturating_sub(room);
+        let memory = |_| ParticleError::Memory { count: more };
+        self.columns.try_reserve_exact(more).map_err(memory)?;
+        self.weights.try_reserve_exact(more).map_err(memory)?;
 
         // Forward: every stray loses the room it has.
         let mut coming = strays.iter().map(|stray| stray.p).peekable();

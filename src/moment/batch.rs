@@ -55,11 +55,16 @@ pub(crate) struct BatchScratch<const L: usize> {
     weights: Vec<Group<L>>,
 }
 
+/// The most conditions of a system that is solved side by side: A then takes 4 MB a lane.
+const MOST_CONDITIONS: usize = 1000;
+
 impl<const D: usize> BatchSystem<D> {
     pub(crate) fn new(system: &MomentSystem<f64, D>) -> Self {
-        // Sums of two multi-indices must fit eight bits; beyond that nothing is solved here.
+        // Sums of two multi-indices must fit eight bits, and the table of A some memory; beyond that nothing is solved
+        // here.
         let fits = |alpha: &MultiIndex<D>| 2 * alpha.degree() <= u32::from(u8::MAX);
-        let basis = if system.basis().iter().all(fits) { system.basis() } else { &[] };
+        let small = system.conditions() <= MOST_CONDITIONS && system.basis().iter().all(fits);
+        let basis = if small { system.basis() } else { &[] };
         let (conditions, outputs) = (basis.len(), system.outputs());
         let degree = |alpha: Option<&MultiIndex<D>>| alpha.map_or(0, MultiIndex::degree);
         let (low, high) = (degree(basis.first()), degree(basis.last()));

@@ -76,7 +76,8 @@ pub trait Method<const D: usize>: Sync {
     ) -> Result<RowReport>;
 
     /// The weights and reports of several targets at once: the same bits as one by one, for less. A method that can
-    /// work on many stencils side by side overrides it.
+    /// work on many stencils side by side overrides it. The target of a draft stays, and its stencil and weights remain
+    /// of equal length.
     fn weights_batch(&self, drafts: &mut [Draft<D, Self::Out>], scratch: &mut Self::Scratch) {
         for draft in drafts {
             draft.report = self
@@ -87,7 +88,8 @@ pub trait Method<const D: usize>: Sync {
     }
 
     /// How many times the support of a refused row is widened by [`GROWTH`], as far as the provider reaches, before
-    /// [`stand_in`](Self::stand_in) is asked.
+    /// [`stand_in`](Self::stand_in) is asked. Where it is not 0, a row counts as refused also where
+    /// [`report`](Self::report) refuses it.
     fn growths(&self) -> u32 {
         0
     }

@@ -47,7 +47,8 @@ pub struct RowReport {
     /// |d_p| + sum_q |w_pq|, the largest over the outputs: the gain of noise, in units of the operator.
     #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub sum_abs: f64,
-    /// Pairs whose weight is negative before the sign of an image; for a Laplacian each costs the maximum principle.
+    /// Pairs whose weight is negative before the sign of an image, counted for every output; for a Laplacian each costs the
+    /// maximum principle.
     pub negative_weights: usize,
     /// The bound this row sets on the modulus of the eigenvalues of the operator, in units of the operator.
     #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]

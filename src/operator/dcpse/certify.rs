@@ -2,7 +2,7 @@
 
 use super::Settings;
 use super::group::{Column, Conditions, Group, Pairing};
-use crate::error::{Error, OperatorError, Result};
+use crate::error::{Error, ErrorKind, OperatorError, Result};
 use crate::moment::{BatchScratch, MomentScratch, MomentSolver, Rung, Solution};
 use crate::operator::method::spread;
 use crate::stencil::Stencil;
@@ -69,7 +69,6 @@ pub(super) fn certify<S: MomentSolver, const D: usize, const K: usize, const L: 
             {
                 found[i] = Err(error);
             }
-            room.w[i].clear();
             room.w[i].resize(room.z[i].len() * outputs.len(), 0.0);
         }
         let mut known = [None; L];
@@ -81,26 +80,35 @@ pub(super) fn certify<S: MomentSolver, const D: usize, const K: usize, const L: 
         let mut finish = |i: usize, certificate: &mut Certificate| {
             let (inverse, ratio) = scales[i];
             let (z, w) = (&room.z[i], &mut room.w[i]);
+            let neighbors = jobs[i].row.len();
+            let refuse = |rank, condition, residual| {
+                Error::from(OperatorError::Uncertified { neighbors, conditions, rank, condition, residual, ratio })
+            };
             let solution = match known[i].filter(|known| known.is_sharp(conditions, largest)) {
                 Some(known) => known,
                 None => {
                     system.fill(z, settings.window, ratio);
-                    solver.climb(known[i], system, &mut room.moments, w)?
+                    let solved = solver.climb(known[i], system, &mut room.moments, w);
+                    solved.map_err(|error| match *error.kind() {
+                        // Without weights all is missed.
+                        ErrorKind::Operator(OperatorError::Singular { rank, .. }) => {
+                            refuse(rank, f64::INFINITY, largest)
+                        }
+                        _ => error,
+                    })?
                 }
             };
             let Solution { rung, rank, condition, residual } = solution;
             if !solution.is_within(conditions, largest) {
-                let (neighbors, residual) = (jobs[i].row.len(), residual.absolute);
-                let kind = OperatorError::Uncertified { neighbors, conditions, rank, condition, residual, ratio };
-                return Err(Error::from(kind));
+                return Err(refuse(rank, condition, residual.absolute));
             }
             certificate.conditions = certificate.conditions.max(conditions);
             certificate.rank = certificate.rank.max(rank);
             certificate.condition = certificate.condition.max(condition);
             certificate.residual = certificate.residual.max(residual.absolute);
             certificate.rung = certificate.rung.max(Some(rung));
-            certificate.negative += w.iter().filter(|&&w| w < 0.0).count();
             for (&column, solved) in outputs.iter().zip(w.chunks_exact(z.len())) {
+                certificate.negative += solved.iter().take(neighbors).filter(|&&w| w < 0.0).count();
                 hand_out(column, solved, inverse, pairing, &mut jobs[i])?;
             }
             Ok(())
