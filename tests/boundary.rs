@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use parops::{
     Apply, ApplyError, BoundaryCondition, BoundaryError, BoundaryRows, CellList, Contraction, CsrMatrix, Cutoff, DcPse,
-    Domain, ErrorKind, Face, Gradient, Laplacian, LinearError, MultiIndex, MultiIndexError, Nearest, OperatorError,
-    Particles, Plan, Random, Rk4, Rows, Sign, SparseSolver, StepLimit, graded, integrate,
+    Domain, ErrorKind, Face, Fallback, Gradient, Laplacian, LinearError, MultiIndex, MultiIndexError, Nearest,
+    OperatorError, Particles, Plan, Random, Rk4, Rows, Sign, SparseSolver, StepLimit, graded, integrate,
 };
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
@@ -622,6 +622,54 @@ fn failing_call_leaves_the_field_as_it_was() {
     assert_eq!(error.kind(), &ApplyError::Input { found: 80, needed: 81 }.into());
     let error = boundary.replace_values(|_| 0.0, &mut u[1..]).unwrap_err();
     assert_eq!(error.kind(), &ApplyError::Input { found: 80, needed: 81 }.into());
+}
+
+#[test]
+fn boundary_value_that_overflows_is_named_by_its_particle() {
+    let set = Walled::<1>::new(20, 0.3, 1);
+    // The solution overflows; then the right side does when it is scaled like its row.
+    for (b, g) in [(1e-200, 1e200), (1e-250, 1e300)] {
+        let conditions = [BoundaryCondition::dirichlet(0), BoundaryCondition::robin(20, [1.0], 0.0, b)];
+        let mut boundary = BoundaryRows::build(&conditions, 2, &set.cells(2, 3.0)).unwrap();
+        let mut u = vec![0.5; 21];
+        let error = boundary.impose(|p| if p == 20 { g } else { 0.0 }, &mut u).unwrap_err();
+        assert!(matches!(error.kind(), ErrorKind::Apply(ApplyError::Overflow { .. })), "{error}");
+        assert_eq!(error.particle(), Some(20), "{error}");
+        assert_eq!(u, [0.5; 21]);
+    }
+}
+
+#[test]
+fn matrix_without_a_row_per_particle_takes_no_conditions() {
+    let set = Walled::<1>::new(20, 0.3, 1);
+    let boundary = BoundaryRows::build(&[BoundaryCondition::dirichlet(0)], 2, &set.cells(2, 3.0)).unwrap();
+    for rows in [1, 20, 22] {
+        let mut matrix = CsrMatrix::from_triplets(rows, 21, [(0, 3, 1.0)]).unwrap();
+        let before = matrix.clone();
+        let error = boundary.replace_in(&mut matrix).unwrap_err();
+        assert_eq!(error.kind(), &LinearError::Length { found: rows, needed: 21 }.into());
+        assert_eq!(matrix, before);
+    }
+}
+
+#[test]
+fn gradient_that_may_fall_back_gives_conditions_of_lower_order_but_no_empty_ones() {
+    let rod = Particles::new((0..=20).map(|i| [0.05 * f64::from(i)]).collect()).unwrap();
+    // Six neighbors at the end: 3 l for r = 2, half of that for r = 4.
+    let cells = CellList::build(&rod, &Domain::open(), Cutoff(0.32)).unwrap();
+    let ends = [BoundaryCondition::dirichlet(0), BoundaryCondition::neumann(20, [1.0])];
+    let build = |fallback| BoundaryRows::build_with(&ends, &gradient::<1>(4, 3.0).fallback(fallback), &cells);
+    let mut boundary = build(Fallback::LowerOrder).unwrap();
+    assert_eq!((boundary.report().lowered, boundary.report().order), (1, Some(2)));
+    let mut u: Vec<f64> = rod.points().iter().map(|x| x[0] * x[0]).collect();
+    u[20] = 7.0;
+    boundary.impose(|p| if p == 20 { 2.0 } else { 0.0 }, &mut u).unwrap();
+    assert!((u[20] - 1.0).abs() < 1e-12, "{}", u[20]);
+    for fallback in [Fallback::Refuse, Fallback::Empty] {
+        let error = build(fallback).unwrap_err();
+        assert!(matches!(error.kind(), ErrorKind::Operator(OperatorError::TooFew { neighbors: 6, .. })), "{error}");
+        assert_eq!(error.particle(), Some(20));
+    }
 }
 
 #[test]

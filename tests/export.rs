@@ -344,7 +344,7 @@ fn weights_of_every_output_are_seen_through_the_trait() -> Result<()> {
 #[cfg(feature = "serde")]
 mod saved {
     use super::*;
-    use parops::{ApplyError, Report, RowReport};
+    use parops::{ApplyError, DivGrad, Report, RowReport};
     use serde::{Serialize, de::DeserializeOwned};
     use serde_json::{Value, json};
 
@@ -385,6 +385,12 @@ mod saved {
         equal_bits(&Rows::<_, f64>::assemble(&mixed, &cells)?);
         let off = CellList::build_at(&[[0.4, 0.4], [0.5, 0.6]], &particles, &Domain::open(), Cutoff(0.3))?;
         equal_bits(&mixed.assemble(&off)?);
+        // Beside an insulator the contrast is infinite.
+        let layers: Vec<_> = (0..225).map(|p| f64::from(p % 2)).collect();
+        let cells = CellList::build(&particles, &Domain::open(), Cutoff(0.4))?;
+        let insulated = DivGrad::new(DcPse::<Laplacian<2>, 2>::new(), layers)?.assemble(&cells)?;
+        assert_eq!(insulated.report().contrast, f64::INFINITY);
+        equal_bits(&insulated);
         let nothing = Particles::new(Vec::<[f64; 2]>::new())?;
         equal_bits(&mixed.assemble(&CellList::build(&nothing, &Domain::open(), Cutoff(0.3))?)?);
         Ok(())
@@ -426,7 +432,7 @@ mod saved {
         let on = serde_json::to_value(gradient.assemble(&cells)?).unwrap();
         let pairs = on["columns"].as_array().unwrap().len();
         type Change<'a> = &'a dyn Fn(&mut Value);
-        let changes: [(&str, &Value, Change); 19] = [
+        let changes: [(&str, &Value, Change); 20] = [
             ("must be", &on, &|rows| rows["offsets"][3] = json!(0)),
             ("must be", &on, &|rows| rows["offsets"][0] = json!(1)),
             ("must be", &on, &|rows| rows["offsets"][144] = json!(pairs - 1)),
@@ -445,6 +451,7 @@ mod saved {
             ("unknown field", &on, &|rows| rows["more"] = json!(1)),
             ("needed", &off, &|rows| drop(rows["centers"].as_array_mut().unwrap().pop())),
             ("does not exist", &off, &|rows| rows["centers"][1] = json!(144)),
+            ("needed", &on, &|rows| rows["report"]["rows"] = json!(143)),
             ("needed", &on, &|rows| drop(rows["report"]["sums"].as_array_mut().unwrap().pop())),
         ];
         for (i, (reason, rows, change)) in changes.into_iter().enumerate() {

@@ -186,6 +186,18 @@ fn gmres_gives_equal_bits_again_and_under_scaling_by_powers_of_two() -> Result<(
 }
 
 #[test]
+fn gmres_solves_matrices_of_any_scale() -> Result<()> {
+    let entries = [(0, 0, 2.0), (0, 1, 1.0), (1, 0, 1.0), (1, 1, 3.0), (2, 2, 1.0), (2, 0, 0.5)];
+    for scale in [1e-300, 1e-160, 1e160, 1e300] {
+        let a = CsrMatrix::from_triplets(3, 3, entries.map(|(p, q, value)| (p, q, scale * value)))?;
+        let mut x = [0.0; 3];
+        let report = Gmres::new().solve(&a, None, &[3.0, 4.0, 1.5], &mut x)?;
+        assert!(report.iterations <= 4 && x.iter().all(|x| (x * scale - 1.0).abs() < 1e-12), "{scale:e}: {x:?}");
+    }
+    Ok(())
+}
+
+#[test]
 fn gmres_with_nothing_on_the_right_gives_nothing() -> Result<()> {
     let a = convection(4, 0.0)?;
     let mut x = [f64::NAN; 16];

@@ -59,6 +59,7 @@ pub struct Report {
     /// Rows left without weights.
     pub empty: usize,
     /// Largest contrast of the diffusivities in a stencil, see [`RowReport::contrast`].
+    #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub contrast: f64,
     /// Rows in which modes may grow, see [`RowReport::growing`].
     pub growing: usize,

@@ -163,7 +163,7 @@ impl<const K: usize, T: Field> Rows<[f64; K], T> {
     /// The derivative along a vector per target, `out[p]` = sum_k v_k(p) (L_k f)_p: v . grad f, for gradient rows.
     ///
     /// # Errors
-    /// As [`Apply::apply`]; [`ApplyError::Output`] also where `v` does not hold one vector per target, and
+    /// As [`Apply::apply`]; [`ApplyError::Input`] also where `v` does not hold one vector per target, and
     /// [`ApplyError::Field`] where one is not finite.
     pub fn apply_along(&self, v: &[[T; K]], f: &[T], out: &mut [T]) -> Result<()> {
         check(scalars(f), self.sources, out, self.targets())?;

@@ -81,6 +81,7 @@ impl<const K: usize, T: Field> Rows<[f64; K], T> {
             }
             needed = found;
         }
+        length(report.rows, targets)?;
         length(weights.len(), columns.len().saturating_mul(K))?;
         if !diagonal.is_empty() {
             length(diagonal.len(), targets.saturating_mul(K))?;

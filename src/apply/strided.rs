@@ -102,7 +102,7 @@ impl<T: Copy, S: Deref<Target = [T]>> Strided<S> {
         T: Field,
     {
         // Gaps may hold anything, so that only a slice without a bad value is known to be good at once.
-        if all_finite(&self.data) {
+        if self.particles == 0 || all_finite(&self.data) {
             return None;
         }
         let bad = |i: usize| {

@@ -2,7 +2,7 @@
 
 use super::condition::BoundaryCondition;
 use crate::apply::Field;
-use crate::error::{ApplyError, BoundaryError, Error, LinearError, Result};
+use crate::error::{ApplyError, BoundaryError, Error, ErrorKind, LinearError, Result};
 use crate::linear::{CsrMatrix, SolveReport, SparseSolver};
 use crate::particles::reserved;
 
@@ -133,7 +133,7 @@ impl Coupled {
             self.right[row] = right;
         }
         let solved = match &mut self.solver {
-            Some(solver) => solver.solve(&self.right, &mut self.x)?,
+            Some(solver) => solver.solve(&self.right, &mut self.x).map_err(|error| named(error, &self.unknown))?,
             None => SolveReport::default(),
         };
         let fixed = self.fixed.iter().map(|fixed| fixed.particle).zip(&self.fixed_values);
@@ -156,14 +156,25 @@ fn prepared(coupling: CsrMatrix, particles: &[usize]) -> Result<(Option<SparseSo
     if particles.is_empty() {
         return Ok((None, 0.0));
     }
-    // The solver names rows.
-    let name = |error: Error| match error.particle().and_then(|row| particles.get(row)) {
-        Some(&p) => error.at(p),
-        None => error,
-    };
+    let name = |error| named(error, particles);
     let mut solver = SparseSolver::new(coupling).map_err(name)?;
     let condition = solver.condition().map_err(name)?;
     if condition < SINGULAR { Ok((Some(solver), condition)) } else { Err(LinearError::Singular { condition }.into()) }
+}
+
+/// The solver names rows, these are the particles of them. A right side too large to be scaled like its row belongs to a
+/// boundary value that is too large.
+fn named(error: Error, particles: &[usize]) -> Error {
+    let error = match (error.kind(), error.particle()) {
+        (&ErrorKind::Linear(LinearError::Value { value }), Some(row)) => {
+            Error::from(ApplyError::Overflow { value }).at(row)
+        }
+        _ => error,
+    };
+    match error.particle().and_then(|row| particles.get(row)) {
+        Some(&p) => error.at(p),
+        None => error,
+    }
 }
 
 /// g at a particle.

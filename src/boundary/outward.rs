@@ -89,15 +89,22 @@ impl<M: Method<D, Out = [f64; D]>, const D: usize> Method<D> for Outward<M, D> {
     }
 
     /// A share that is small but positive is taken where the reach ends; the condition number of the coupled system
-    /// shows what it costs.
+    /// shows what it costs. Other refusals are for the method to settle, on the same terms.
     fn stand_in(&self, draft: &mut Draft<D, [f64; 1]>, scratch: &mut Self::Scratch) {
-        let kind = draft.report.as_ref().err().map(Error::kind);
-        if let Some(ErrorKind::Boundary(BoundaryError::OwnWeight { share, .. })) = kind
-            && *share > 0.0
-        {
-            let made = self.normal.weights(&draft.stencil, scratch, &mut draft.weights, &mut draft.diagonal);
-            draft.report =
-                made.and_then(|()| self.normal.report(&draft.stencil, scratch, &draft.weights, &draft.diagonal));
+        let Err(refusal) = draft.report.clone() else { return };
+        match refusal.kind() {
+            ErrorKind::Boundary(BoundaryError::OwnWeight { share, .. }) if *share > 0.0 => {
+                let made = self.normal.weights(&draft.stencil, scratch, &mut draft.weights, &mut draft.diagonal);
+                draft.report =
+                    made.and_then(|()| self.normal.report(&draft.stencil, scratch, &draft.weights, &draft.diagonal));
+            }
+            ErrorKind::Boundary(_) => {}
+            _ => {
+                self.normal.stand_in(draft, scratch);
+                if draft.report.is_ok() && !(share(&draft.weights, &draft.diagonal) > 0.0) {
+                    draft.report = Err(refusal);
+                }
+            }
         }
     }
 }

@@ -5,7 +5,7 @@ use super::condition::BoundaryCondition;
 use super::coupled::{BoundaryReport, Coupled};
 use super::outward::Outward;
 use crate::apply::{Field, Report, Rows};
-use crate::error::{ApplyError, BoundaryError, Error, Result};
+use crate::error::{ApplyError, BoundaryError, Error, LinearError, Result};
 use crate::linear::CsrMatrix;
 use crate::moment::MomentSolver;
 use crate::neighbors::Neighbors;
@@ -69,7 +69,7 @@ impl BoundaryRows {
     /// [`OperatorError::TooFew`](crate::OperatorError::TooFew) where the reach holds fewer than 3 l neighbors,
     /// [`BoundaryError::OwnWeight`] where u_p has no or a negative weight within the reach, and what
     /// else [`Rows::assemble`] refuses. [`MultiIndexError::Order`](crate::MultiIndexError::Order) for an illegal order.
-    /// [`LinearError::Singular`](crate::LinearError::Singular) where the conditions do not determine the boundary values,
+    /// [`LinearError::Singular`] where the conditions do not determine the boundary values,
     /// and what else [`SparseSolver::new`](crate::SparseSolver::new) refuses.
     pub fn build<const D: usize, P: Neighbors<D>>(
         conditions: &[BoundaryCondition<D>],
@@ -83,7 +83,8 @@ impl BoundaryRows {
     /// The rows of these conditions with a gradient of your own settings.
     ///
     /// Take at least 3 neighbors per condition, and the sign '-'. A smoothing length per particle counts the conditions
-    /// with b != 0, in the order of `conditions`.
+    /// with b != 0, in the order of `conditions`. A row of lower order, where the gradient may fall back to one, is taken
+    /// where u_p has a positive weight in it; an empty row is refused like the row it stands for.
     ///
     /// # Errors
     /// As [`build`](Self::build).
@@ -132,13 +133,14 @@ impl BoundaryRows {
     /// g(p) is the right side at particle p, a value of the moment where it depends on time.
     ///
     /// Values of Neumann and Robin particles stand in each other's rows: they are found together from one sparse system,
-    /// to a relative residual of 1e-13. What stands in u at boundary particles is not read. Where g is given for u
-    /// alone, u = g/a to the bit. Nothing is allocated after the first call.
+    /// to a relative residual of 1e-13, or what rounding leaves of it, see [`SparseSolver`](crate::SparseSolver). What
+    /// stands in u at boundary particles is not read. Where g is given for u alone, u = g/a to the bit. Nothing is
+    /// allocated after the first call.
     ///
     /// # Errors
     /// [`ApplyError::Input`] for a field of another length; [`BoundaryError::Value`] naming the particle where g is not
     /// finite, [`ApplyError::Field`] one whose value is needed and is not finite, [`ApplyError::Overflow`] one whose
-    /// boundary value is not; [`LinearError::NotConverged`](crate::LinearError::NotConverged) where the residual is not
+    /// boundary value is not; [`LinearError::NotConverged`] where the residual is not
     /// reached. `u` is then as it was.
     pub fn impose<T: Field>(&mut self, g: impl FnMut(usize) -> f64, u: &mut [T]) -> Result<BoundaryReport> {
         self.coupled.impose(g, u)
@@ -160,9 +162,12 @@ impl BoundaryRows {
     /// conditions at the boundary.
     ///
     /// # Errors
-    /// [`LinearError::Length`](crate::LinearError::Length) and [`LinearError::Index`](crate::LinearError::Index) for a
-    /// matrix that is not square with a row per particle; it is then as it was.
+    /// [`LinearError::Length`] for a matrix that is not square with a row per particle; it is then as it was.
     pub fn replace_in(&self, matrix: &mut CsrMatrix) -> Result<()> {
+        let (found, needed) = (matrix.rows(), self.matrix.columns());
+        if found != needed {
+            return Err(LinearError::Length { found, needed }.into());
+        }
         matrix.replace_rows(&self.matrix, self.particles.iter().copied().zip(0..))
     }
 

@@ -304,9 +304,17 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
-/// The Euclidean norm; the vectors here are scaled, so squares do not overflow.
+/// A sum of squares above which none that counts is subnormal.
+const LEAST_SQUARE: f64 = 1e-250;
+
+/// The Euclidean norm, of vectors of any scale: b is scaled, A need not be.
 fn norm(x: &[f64]) -> f64 {
-    dot(x, x).sqrt()
+    let square = dot(x, x);
+    if square > LEAST_SQUARE && square.is_finite() {
+        return square.sqrt();
+    }
+    let scale = inverse_power(x.iter().fold(0.0, |largest, x| x.abs().max(largest)));
+    x.iter().fold(0.0, |sum, x| sum + (x * scale) * (x * scale)).sqrt() / scale
 }
 
 /// The power of two that brings a positive number into [1, 2), as far as normal numbers reach.

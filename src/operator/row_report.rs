@@ -55,6 +55,7 @@ pub struct RowReport {
     pub spectral_bound: f64,
     /// Largest over smallest diffusivity of the stencil, see [`DivGrad`](crate::DivGrad); 1 where there is none, infinite
     /// beside an insulator.
+    #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub contrast: f64,
     /// Whether modes may grow: [`Mean::Arithmetic`](crate::Mean) across a contrast above 10, at an order above 2 and with
     /// weights of both signs.
