@@ -31,8 +31,8 @@ const NEIGHBORS_PER_CONDITION: f64 = 3.0;
 /// 70 to 280 in 3D (r = 2 and 4), whatever the number of particles, and a Robin term with a b >= 0 only helps. A_BB can be
 /// singular for a b < 0, where a u_p cancels what du/dn takes of u_p (a ~ -b/h): that is refused, and so is a normal that
 /// points inwards, where u_p has the wrong sign. A steady problem with Neumann conditions only is singular whatever its
-/// rows, for a constant can be added to u: [`SparseSolver`](crate::SparseSolver) refuses it. Give one value, or a Robin
-/// condition.
+/// rows, for a constant can be added to u: the sparse LU refuses it, GMRES a right side without a solution. Give one value,
+/// or a Robin condition.
 ///
 /// ```
 /// use parops::{BoundaryCondition, BoundaryRows, CellList, Cutoff, Domain, Particles};
