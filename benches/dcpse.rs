@@ -14,7 +14,8 @@ use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Const, DimMin, SMatrix, SVector, ToTypenum};
 use parops::{
-    CellList, Cutoff, DcPse, Domain, Draft, Laplacian, Method, Neighbors, Operator, Particles, Rung, Stencil, graded,
+    CellList, Cholesky, Cutoff, DcPse, Domain, Draft, Laplacian, Lu, Method, MomentSolver, Neighbors, Operator,
+    Particles, PivotedQr, Qr, Rung, Stencil, graded,
 };
 
 /// cutoff / epsilon.
@@ -161,6 +162,21 @@ fn timed<T>(
     best.iter().sum::<f64>() * 1e9 / count as f64
 }
 
+/// The same rows by one solver alone, one stencil after another: what each rung of the ladder costs.
+fn alone<const D: usize, const R: u32, S: MomentSolver>(
+    group: &mut BenchmarkGroup<'_, WallTime>,
+    id: BenchmarkId,
+    solver: S,
+    drafts: &mut [Draft<D, [f64; 1]>],
+) -> f64
+where
+    Laplacian<D>: Operator<D, Out = [f64; 1]> + Default,
+{
+    let dcpse = DcPse::<Laplacian<D>, R>::new().solver(solver);
+    let mut scratch = dcpse.scratch().expect("a legal operator");
+    timed(group, id, drafts, |drafts| dcpse.weights_batch(drafts, &mut scratch))
+}
+
 fn case<const D: usize, const R: u32, const C: usize, const N: usize>(c: &mut Criterion)
 where
     Laplacian<D>: Operator<D, Out = [f64; 1]> + Default,
@@ -204,6 +220,11 @@ where
             bare / ours,
             certified / ours
         );
+        let cholesky = alone::<D, R, _>(&mut group, id("Cholesky alone"), Cholesky, &mut drafts);
+        let qr = alone::<D, R, _>(&mut group, id("QR alone"), Qr, &mut drafts);
+        let pivoted = alone::<D, R, _>(&mut group, id("pivoted QR alone"), PivotedQr, &mut drafts);
+        let lu = alone::<D, R, _>(&mut group, id("LU alone"), Lu, &mut drafts);
+        println!("{name}, one at a time: Cholesky {cholesky:.0} ns, QR {qr:.0}, pivoted QR {pivoted:.0}, LU {lu:.0}");
     }
     group.finish();
 }
