@@ -4,8 +4,8 @@
 //! gathered: interior rows, and rows at a face. The loop solves one particle after another with matrices of fixed size:
 //! A = B^T B of the windowed, scaled monomials by symmetric rank-one updates (of the ways nalgebra offers the fastest at
 //! three of the four sizes), LU with partial pivoting, weights. Once it stops there; once it goes on to what our rows are
-//! certified by, the residual of all conditions and an estimate of the condition number. The figures at the end of each
-//! size are the best of all samples, block of rows by block.
+//! certified by, the residual of all conditions and an estimate of the condition number. Then each of our solvers has the
+//! rows to itself. The figures at the end of each size are the best of all samples, block of rows by block.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
