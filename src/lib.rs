@@ -66,14 +66,14 @@ pub use moment::{
 };
 pub use multi_index::*;
 pub use neighbors::{
-    BruteForce, Canonical, CellList, Nearest, NeighborList, Neighbors, epsilon_from_neighbors, mean_neighbor_distance,
+    BruteForce, Canonical, CellList, Nearest, NeighborList, Neighbors, Upstream, epsilon_from_neighbors, mean_neighbor_distance,
     volumes_from_neighbors,
 };
 pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};
 pub use scalar::Scalar;
 pub use scale::{Cutoff, Epsilon, Spacing, Volumes};
-pub use stencil::{Neighbor, Stencil};
+pub use stencil::{Neighbor, Side, Stencil};
 pub use time::*;
 
 #[cfg(feature = "testing")]

@@ -7,13 +7,17 @@ mod export;
 mod faer_matrix;
 mod gmres;
 mod ilu;
+mod invariant;
+mod krylov;
 #[cfg(feature = "faer")]
 mod lu;
 mod matrix_market;
 mod replace;
 mod solver;
+mod spectrum;
 
 pub use csr::CsrMatrix;
 pub use gmres::{Gmres, SolveReport};
 pub use ilu::Ilu0;
 pub use solver::SparseSolver;
+pub use spectrum::{Spectrum, SpectrumEstimator};

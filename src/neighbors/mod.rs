@@ -13,6 +13,7 @@ mod order;
 mod placed;
 mod row_check;
 mod table;
+mod upstream;
 
 pub use brute_force::BruteForce;
 pub use canonical::Canonical;
@@ -20,6 +21,7 @@ pub use cell_list::CellList;
 pub use list::NeighborList;
 pub use measure::{epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors};
 pub use nearest::Nearest;
+pub use upstream::Upstream;
 
 use crate::error::Result;
 use crate::stencil::{Neighbor, Stencil};
