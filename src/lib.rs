@@ -51,12 +51,16 @@ mod scale;
 mod stencil;
 mod time;
 
-pub use apply::{Apply, Field, Histogram, MatrixFree, RawRows, Report, Row, Rows, Strided, Vector};
+pub use apply::{
+    Advect, Apply, Field, Histogram, Hyperviscosity, MatrixFree, RawRows, Report, Row, Rows, SidedRows, Strided,
+    UpwindDcPse, UpwindRows, Vector,
+};
 pub use boundary::*;
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
 pub use error::*;
 pub use kernel::{
-    ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Rational, SmoothingKernel, WideGaussian,
+    AnisotropicGaussian, ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, OneSidedGaussian, Rational,
+    SmoothingKernel, WideGaussian,
 };
 pub use linear::*;
 pub use moment::{
@@ -66,8 +70,8 @@ pub use moment::{
 };
 pub use multi_index::*;
 pub use neighbors::{
-    BruteForce, Canonical, CellList, Nearest, NeighborList, Neighbors, Upstream, epsilon_from_neighbors, mean_neighbor_distance,
-    volumes_from_neighbors,
+    BruteForce, Canonical, CellList, Nearest, NeighborList, Neighbors, Selected, Upstream, epsilon_from_neighbors,
+    mean_neighbor_distance, volumes_from_neighbors,
 };
 pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};

@@ -112,6 +112,11 @@ impl<const D: usize> Stencil<D> {
         self.middle = middle;
     }
 
+    /// Names another target for the neighbors it holds.
+    pub(crate) fn rename(&mut self, target: usize) {
+        self.target = target;
+    }
+
     /// Adds a neighbor. Providers hold fewer than 2^32 sources, so that an index fits 32 bits.
     #[inline(always)]
     pub fn push(&mut self, neighbor: Neighbor<D>) {

@@ -5,8 +5,8 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use parops::{
-    Allowance, CellList, Domain, Epsilon, Euler, Gradient, Laplacian, Leapfrog, Method, Neighbors, Particles, Pse, Rk4,
-    Sph, Stencil, Stepper,
+    Allowance, CellList, D2, DivTensorGrad, Domain, Epsilon, Euler, Gradient, Hessian, Laplacian, Leapfrog, Method,
+    Neighbors, OneSided, Particles, Pse, Rk4, Side, Sph, Stencil, Stepper, Upwind,
 };
 #[cfg(not(feature = "rayon"))]
 use parops::{Apply, BoundaryCondition, BoundaryRows, NeighborList, Rows, Strided};
@@ -108,15 +108,36 @@ fn weights_into_given_scratch_allocate_nothing_once_a_row_of_that_size_was_made(
     // Rows that the first solver does not certify go through the others: one of those was made by then too.
     let dcpse = parops::DcPse::<Gradient<2>, 2>::new();
     assert_eq!(rows, count_weights(&dcpse, &neighbors));
+
+    let (epsilon, volumes) = (Epsilon::global(2.0 / 30.0).unwrap(), particles.volumes().unwrap());
+    let upwind = Upwind::new(vec![[1.0, -1.0]; 900], epsilon.clone(), volumes).unwrap().support(3.0).unwrap();
+    assert_eq!(rows, count_weights(&upwind, &neighbors));
+    let closure = OneSided::new(D2::<2, 0>::default(), Side::Left, 2, epsilon.clone(), volumes).unwrap();
+    // The longest half-stencil need not be that of the longest row: here every row is made before one is counted.
+    assert_eq!(rows, count_weights_after(0..rows, &closure.support(3.0).unwrap(), &neighbors));
+    let hessian = Pse::anisotropic(Hessian::<2>, epsilon, volumes).unwrap().support(3.0).unwrap();
+    let tensors = vec![[[2.0, 0.5], [0.5, 1.0]]; 900];
+    let tensor = DivTensorGrad::new(hessian.allow(Allowance::Everywhere), &tensors).unwrap();
+    assert_eq!(rows, count_weights(&tensor, &neighbors));
 }
 
 /// Makes the longest row, then all of them, and returns how many were made without an allocation: all.
 fn count_weights<M: Method<2>>(method: &M, neighbors: &CellList<2>) -> usize {
+    let longest = (0..neighbors.targets()).max_by_key(|&p| neighbors.count(p, neighbors.reach())).unwrap();
+    count_weights_after([longest], method, neighbors)
+}
+
+/// Makes the rows `first`, then all of them, and returns how many were made without an allocation: all.
+fn count_weights_after<M: Method<2>>(
+    first: impl IntoIterator<Item = usize>,
+    method: &M,
+    neighbors: &CellList<2>,
+) -> usize {
     let cutoff = neighbors.reach();
-    let longest = (0..neighbors.targets()).max_by_key(|&p| neighbors.count(p, cutoff)).unwrap();
+    let most = (0..neighbors.targets()).map(|p| neighbors.count(p, cutoff)).max().unwrap();
     let mut row = Stencil::default();
     let mut scratch = method.scratch().unwrap();
-    let mut weights = vec![<M::Out as parops::Outputs>::ZERO; neighbors.count(longest, cutoff)];
+    let mut weights = vec![<M::Out as parops::Outputs>::ZERO; most];
     let mut diagonal = <M::Out as parops::Outputs>::ZERO;
     let mut make = |p: usize| {
         neighbors.gather(p, cutoff, &mut row);
@@ -124,7 +145,7 @@ fn count_weights<M: Method<2>>(method: &M, neighbors: &CellList<2>) -> usize {
         method.weights(&row, &mut scratch, weights, &mut diagonal).unwrap();
         std::hint::black_box(method.report(&row, &scratch, weights, &diagonal).unwrap());
     };
-    make(longest);
+    first.into_iter().for_each(&mut make);
     let count = allocations(|| (0..neighbors.targets()).for_each(&mut make));
     assert_eq!(count, 0);
     neighbors.targets()
@@ -153,6 +174,9 @@ fn applying_stored_rows_allocates_nothing_and_matrix_free_nothing_after_the_firs
     assert_eq!(allocations(|| gradient.apply_dot(&outs, &mut out).unwrap()), 0);
     assert_eq!(allocations(|| gradient.apply_along(&outs, &f, &mut out).unwrap()), 0);
     assert_eq!(allocations(|| gradient.apply_curl(&outs, &mut out).unwrap()), 0);
+    let any = parops::UpwindGradient::new(Epsilon::global(2.0 / 30.0).unwrap(), particles.volumes().unwrap());
+    let any = any.support(3.0).unwrap().assemble(&neighbors).unwrap();
+    assert_eq!(allocations(|| any.apply(&outs, &f, &mut out).unwrap()), 0);
     let mut jacobian = vec![[[0.0; 2]; 2]; n];
     assert_eq!(allocations(|| gradient.apply_jacobian(&outs, &mut jacobian).unwrap()), 0);
     let (fields, mut results) = (vec![[1.0; 5]; n], vec![[0.0; 5]; n]);

@@ -15,9 +15,11 @@ mod matrix_market;
 mod replace;
 mod solver;
 mod spectrum;
+mod tuning;
 
 pub use csr::CsrMatrix;
 pub use gmres::{Gmres, SolveReport};
 pub use ilu::Ilu0;
 pub use solver::SparseSolver;
 pub use spectrum::{Spectrum, SpectrumEstimator};
+pub use tuning::Tuning;
