@@ -3,7 +3,7 @@
 mod dense;
 
 use parops::{
-    Along, Allowance, Apply, CellList, CsrMatrix, DcPse, Domain, ErrorKind, Laplacian, LinearError, Nearest, Particles,
+    Allowance, Along, Apply, CellList, CsrMatrix, DcPse, Domain, ErrorKind, Laplacian, LinearError, Nearest, Particles,
     Pse, Result, Rows, Sign, Spectrum, SpectrumEstimator,
 };
 use proptest::prelude::*;

@@ -4,8 +4,8 @@ use super::Settings;
 use super::group::{Column, Conditions, Group, Pairing};
 use crate::error::{Error, ErrorKind, OperatorError, Result};
 use crate::moment::{BatchScratch, MomentScratch, MomentSolver, Rung, Solution, Windows};
-use crate::scalar::square;
 use crate::operator::method::spread;
+use crate::scalar::square;
 use crate::stencil::Stencil;
 
 /// Room for the scaled separations and the weights of L targets.
