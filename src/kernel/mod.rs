@@ -1,16 +1,24 @@
-//! Kernels: smoothing W, exchange eta^beta. A kernel is unscaled (epsilon = 1); methods scale it.
+//! Kernels: smoothing W, exchange eta^beta, mesh kernels. A kernel is unscaled (epsilon = 1, or the spacing of the mesh);
+//! methods and meshes scale it.
 
+mod assignment;
 mod derivation;
 mod exchange;
 mod gaussian;
 mod harmonic;
 mod high_order;
+mod interpolation;
+mod lambda;
+mod mesh_kernel;
 mod polynomial;
 mod rational;
 
+pub use assignment::{Cic, Ngp, Tsc};
 pub use exchange::Exchange;
 pub use gaussian::{Gaussian, WideGaussian};
 pub use high_order::HighOrderGaussian;
+pub use lambda::Lambda;
+pub use mesh_kernel::MeshKernel;
 pub use polynomial::ExactPolynomial;
 pub use rational::Rational;
 
