@@ -218,7 +218,6 @@ fn weights_add_up_to_one_within_four_eps_in_both_precisions() {
         let kernel = Lambda::<P, R>::new().unwrap();
         let double = worst_sum::<f64, S>(&kernel, f64::EPSILON, |x| x);
         let single = worst_sum::<f32, S>(&kernel, f32::EPSILON.into(), f64::from);
-        println!("({P}, {R}): {double} and {single} eps");
         assert!(double <= LIMIT && single <= LIMIT, "({P}, {R}): {double} and {single} eps");
     }
     each_golden!(check);
