@@ -52,7 +52,7 @@ impl<const P: usize, const R: usize> Lambda<P, R> {
     /// fit 128-bit rationals.
     pub fn new() -> Result<Self> {
         let (exactness, regularity) = (P as u64, R as u64);
-        if P % 2 != 0 || P == 0 || P / 2 > R {
+        if !P.is_multiple_of(2) || P == 0 || P / 2 > R {
             return Err(KernelError::Lambda { exactness, regularity }.into());
         }
         let overflow = || KernelError::LambdaOverflow { exactness, regularity };
