@@ -1,11 +1,13 @@
 //! The Gaussian smoothing kernel exp(-|z|^2/2), and the wide Gaussian exp(-|z|^2/4) of the diffusion operator.
 
-use std::f64::consts::{PI, SQRT_2};
+use std::array;
+use std::f64::consts::SQRT_2;
 
-use super::{Kernel, SmoothingKernel, gaussian_constant};
+use super::decay::{decay, in_lanes};
+use super::{INVERSE_ROOT_PI, INVERSE_ROOT_TWO_PI, Kernel, SmoothingKernel, gaussian_constant};
 use crate::error::Result;
 use crate::multi_index::{MultiIndex, Term};
-use crate::scalar::{Scalar, square};
+use crate::scalar::Scalar;
 
 /// The Gaussian smoothing kernel W(z) = (2 pi)^(-D/2) exp(-|z|^2/2), of order 2.
 ///
@@ -35,7 +37,10 @@ pub struct Gaussian<const D: usize> {
 impl<const D: usize> Gaussian<D> {
     /// The kernel.
     pub fn new() -> Self {
-        Self { term: [Term { index: MultiIndex::ZERO, factor: 1.0 }], constant: gaussian_constant::<D>(2.0 * PI) }
+        Self {
+            term: [Term { index: MultiIndex::ZERO, factor: 1.0 }],
+            constant: gaussian_constant::<D>(INVERSE_ROOT_TWO_PI),
+        }
     }
 }
 
@@ -48,7 +53,12 @@ impl<const D: usize> Default for Gaussian<D> {
 impl<T: Scalar, const D: usize> Kernel<T, D> for Gaussian<D> {
     #[inline]
     fn value(&self, z: &[T; D]) -> T {
-        (square(z) * T::lift(-0.5)).exp() * T::lift(self.constant)
+        let [value] = profile(&[*z], 0.5, self.constant);
+        value
+    }
+
+    fn values(&self, z: &[[T; D]], out: &mut [T]) {
+        in_lanes(z, out, |z| profile(z, 0.5, self.constant));
     }
 
     fn terms(&self) -> &[Term<D>] {
@@ -84,19 +94,22 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for Gaussian<D> {
     }
 
     fn combination(&self, terms: &[Term<D>], z: &[[T; D]], out: &mut [T]) -> Result<()> {
-        for (z, out) in z.iter().zip(out) {
-            let value = self.value(z);
-            *out = T::zero();
-            for term in terms {
-                let mut product = value;
-                for (&x, n) in z.iter().zip(term.index.exponents()) {
-                    if n > 0 {
-                        product *= signed_hermite(n, x);
+        in_lanes(z, out, |z| {
+            let values = profile(z, 0.5, self.constant);
+            array::from_fn(|i| {
+                let mut sum = T::zero();
+                for term in terms {
+                    let mut product = values[i];
+                    for (&x, n) in z[i].iter().zip(term.index.exponents()) {
+                        if n > 0 {
+                            product *= signed_hermite(n, x);
+                        }
                     }
+                    sum += T::lift(term.factor) * product;
                 }
-                *out += T::lift(term.factor) * product;
-            }
-        }
+                sum
+            })
+        });
         Ok(())
     }
 
@@ -108,6 +121,12 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for Gaussian<D> {
     fn normalization(&self) -> f64 {
         self.constant
     }
+}
+
+/// c exp(-a |z|^2).
+#[inline(always)]
+fn profile<T: Scalar, const D: usize, const L: usize>(z: &[[T; D]; L], a: f64, constant: f64) -> [T; L] {
+    decay(z, a).1.map(|value| value * T::lift(constant))
 }
 
 /// (-1)^n He_n(x), by g_(n+1) = -x g_n - n g_(n-1).
@@ -149,7 +168,10 @@ impl<const D: usize> WideGaussian<D> {
             exponents[axis] = 2;
             Term { index: MultiIndex::new(exponents), factor: 1.0 }
         };
-        Self { terms: std::array::from_fn(second), constant: gaussian_constant::<D>(4.0 * PI) }
+        Self {
+            terms: std::array::from_fn(second),
+            constant: gaussian_constant::<D>(INVERSE_ROOT_PI.map(|part| 0.5 * part)),
+        }
     }
 }
 
@@ -162,7 +184,12 @@ impl<const D: usize> Default for WideGaussian<D> {
 impl<T: Scalar, const D: usize> Kernel<T, D> for WideGaussian<D> {
     #[inline]
     fn value(&self, z: &[T; D]) -> T {
-        (square(z) * T::lift(-0.25)).exp() * T::lift(self.constant)
+        let [value] = profile(&[*z], 0.25, self.constant);
+        value
+    }
+
+    fn values(&self, z: &[[T; D]], out: &mut [T]) {
+        in_lanes(z, out, |z| profile(z, 0.25, self.constant));
     }
 
     fn terms(&self) -> &[Term<D>] {

@@ -1,5 +1,6 @@
 //! Kernels: smoothing W, exchange eta^beta. A kernel is unscaled (epsilon = 1); methods scale it.
 
+mod decay;
 mod derivation;
 mod exchange;
 mod gaussian;
@@ -129,7 +130,15 @@ pub trait SmoothingKernel<T: Scalar, const D: usize>: Kernel<T, D> {
     fn normalization(&self) -> f64;
 }
 
-/// a^(-D/2), for the constant in front of a Gaussian.
-fn gaussian_constant<const D: usize>(a: f64) -> f64 {
-    (0..D).fold(1.0, |product, _| product / a.sqrt())
+/// 1/sqrt(pi) and 1/sqrt(2 pi), in two parts.
+const INVERSE_ROOT_PI: [f64; 2] = [0.564_189_583_547_756_3, 7.667_729_806_582_94e-18];
+const INVERSE_ROOT_TWO_PI: [f64; 2] = [0.398_942_280_401_432_7, -2.492_327_202_277_73e-17];
+
+/// root^D, rounded once: the constant in front of a Gaussian.
+fn gaussian_constant<const D: usize>(root: [f64; 2]) -> f64 {
+    let (high, low) = (0..D).fold((1.0, 0.0), |(high, low): (f64, f64), _| {
+        let product = high * root[0];
+        (product, high.mul_add(root[0], -product) + (high * root[1] + low * root[0]))
+    });
+    high + low
 }
