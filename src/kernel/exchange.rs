@@ -8,7 +8,7 @@ use super::derivation::{harmonics, radial};
 use super::harmonic::Harmonic;
 use super::polynomial::ExactPolynomial;
 use super::rational::Rational;
-use super::{INVERSE_ROOT_PI, Kernel, gaussian_constant};
+use super::{Kernel, gaussian_constant};
 use crate::error::{Error, KernelError, Result};
 use crate::multi_index::{MultiIndex, Term, common_degree};
 use crate::scalar::Scalar;
@@ -154,7 +154,7 @@ impl<const D: usize> Exchange<D> {
         let (s, decay) = decay(z, 1.0);
         let mut sum = [T::zero(); L];
         for piece in &self.pieces {
-            let radial = horner(&piece.radial, &s);
+            let radial = horner_lanes(&piece.radial, &s);
             for i in 0..L {
                 sum[i] += piece.harmonic.value(&z[i]) * radial[i];
             }
@@ -204,7 +204,7 @@ fn derive<const D: usize>(p: ExactPolynomial<D>, m: u32, order: u32) -> Option<V
 impl<const D: usize> Piece<D> {
     fn new(harmonic: Harmonic<D>, radial: &[Rational], factor: f64) -> Self {
         let (harmonic, constant) = harmonic.normalized();
-        let front = constant * gaussian_constant::<D>(INVERSE_ROOT_PI) * factor;
+        let front = constant * gaussian_constant::<D>(std::f64::consts::PI) * factor;
         Self { harmonic, radial: radial.iter().map(|c| c.to_f64() * front).collect() }
     }
 }
@@ -213,13 +213,20 @@ impl<const D: usize> Piece<D> {
 #[inline(always)]
 pub(super) fn radial_profile<T: Scalar, const D: usize, const L: usize>(radial: &[f64], z: &[[T; D]; L]) -> [T; L] {
     let (s, decay) = decay(z, 1.0);
-    let polynomial = horner(radial, &s);
+    let polynomial = horner_lanes(radial, &s);
     array::from_fn(|i| polynomial[i] * decay[i])
 }
 
 /// sum_k c_k s^k.
 #[inline(always)]
-pub(super) fn horner<T: Scalar, const L: usize>(coefficients: &[f64], s: &[T; L]) -> [T; L] {
+pub(super) fn horner<T: Scalar>(coefficients: &[f64], s: T) -> T {
+    let [sum] = horner_lanes(coefficients, &[s]);
+    sum
+}
+
+/// sum_k c_k s^k for several s side by side.
+#[inline(always)]
+fn horner_lanes<T: Scalar, const L: usize>(coefficients: &[f64], s: &[T; L]) -> [T; L] {
     // Begun with the last coefficient, a constant stays one where s overflows.
     let Some((&last, others)) = coefficients.split_last() else { return [T::zero(); L] };
     others.iter().rev().fold([T::lift(last); L], |sum, &c| array::from_fn(|i| sum[i] * s[i] + T::lift(c)))

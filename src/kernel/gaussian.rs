@@ -1,10 +1,9 @@
 //! The Gaussian smoothing kernel exp(-|z|^2/2), and the wide Gaussian exp(-|z|^2/4) of the diffusion operator.
 
-use std::array;
-use std::f64::consts::SQRT_2;
+use std::f64::consts::{PI, SQRT_2};
 
 use super::decay::{decay, in_lanes};
-use super::{INVERSE_ROOT_PI, INVERSE_ROOT_TWO_PI, Kernel, SmoothingKernel, gaussian_constant};
+use super::{Kernel, SmoothingKernel, gaussian_constant};
 use crate::error::Result;
 use crate::multi_index::{MultiIndex, Term};
 use crate::scalar::Scalar;
@@ -37,10 +36,7 @@ pub struct Gaussian<const D: usize> {
 impl<const D: usize> Gaussian<D> {
     /// The kernel.
     pub fn new() -> Self {
-        Self {
-            term: [Term { index: MultiIndex::ZERO, factor: 1.0 }],
-            constant: gaussian_constant::<D>(INVERSE_ROOT_TWO_PI),
-        }
+        Self { term: [Term { index: MultiIndex::ZERO, factor: 1.0 }], constant: gaussian_constant::<D>(2.0 * PI) }
     }
 }
 
@@ -94,22 +90,20 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for Gaussian<D> {
     }
 
     fn combination(&self, terms: &[Term<D>], z: &[[T; D]], out: &mut [T]) -> Result<()> {
-        in_lanes(z, out, |z| {
-            let values = profile(z, 0.5, self.constant);
-            array::from_fn(|i| {
-                let mut sum = T::zero();
-                for term in terms {
-                    let mut product = values[i];
-                    for (&x, n) in z[i].iter().zip(term.index.exponents()) {
-                        if n > 0 {
-                            product *= signed_hermite(n, x);
-                        }
+        self.values(z, out);
+        for (z, out) in z.iter().zip(out) {
+            let value = *out;
+            *out = T::zero();
+            for term in terms {
+                let mut product = value;
+                for (&x, n) in z.iter().zip(term.index.exponents()) {
+                    if n > 0 {
+                        product *= signed_hermite(n, x);
                     }
-                    sum += T::lift(term.factor) * product;
                 }
-                sum
-            })
-        });
+                *out += T::lift(term.factor) * product;
+            }
+        }
         Ok(())
     }
 
@@ -168,10 +162,7 @@ impl<const D: usize> WideGaussian<D> {
             exponents[axis] = 2;
             Term { index: MultiIndex::new(exponents), factor: 1.0 }
         };
-        Self {
-            terms: std::array::from_fn(second),
-            constant: gaussian_constant::<D>(INVERSE_ROOT_PI.map(|part| 0.5 * part)),
-        }
+        Self { terms: std::array::from_fn(second), constant: gaussian_constant::<D>(4.0 * PI) }
     }
 }
 

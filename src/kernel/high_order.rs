@@ -2,7 +2,7 @@
 
 use super::decay::{decay, in_lanes};
 use super::exchange::{Exchange, horner, radial_profile};
-use super::{BLOCK, INVERSE_ROOT_PI, Kernel, SmoothingKernel, gaussian_constant};
+use super::{BLOCK, Kernel, SmoothingKernel, gaussian_constant};
 use crate::error::{KernelError, Result};
 use crate::multi_index::{MultiIndex, Term};
 use crate::scalar::{Scalar, square};
@@ -127,6 +127,7 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for HighOrderGaussian<D> {
         in_lanes(z, out, |z| decay(z, 1.0).1);
         let mut sums = [T::zero(); BLOCK];
         for (z, out) in z.chunks(BLOCK).zip(out.chunks_mut(BLOCK)) {
+            let sums = &mut sums[..z.len()];
             sums.fill(T::zero());
             for &Term { index, factor } in terms {
                 for_each_half(index, |halves, taken| {
@@ -139,13 +140,12 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for HighOrderGaussian<D> {
                         *n -= 2 * k;
                     }
                     let monomial = MultiIndex::new(exponents);
-                    for (z, sum) in z.iter().zip(&mut sums) {
-                        let [radial] = horner(radial, &[square(z)]);
-                        *sum += front * monomial.power(z) * radial;
+                    for (z, sum) in z.iter().zip(&mut *sums) {
+                        *sum += front * monomial.power(z) * horner(radial, square(z));
                     }
                 });
             }
-            for (out, &sum) in out.iter_mut().zip(&sums) {
+            for (out, &sum) in out.iter_mut().zip(&*sums) {
                 *out *= sum;
             }
         }
@@ -153,14 +153,13 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for HighOrderGaussian<D> {
     }
 
     fn gradient(&self, z: &[T; D]) -> Result<[T; D]> {
-        let (s, [decay]) = decay(&[*z], 1.0);
-        let ([value], [slope]) = (horner(&self.profiles[0], &s), horner(&self.profiles[1], &s));
-        let slope = (slope - value) * T::lift(2.0) * decay;
+        let ([s], [decay]) = decay(&[*z], 1.0);
+        let slope = (horner(&self.profiles[1], s) - horner(&self.profiles[0], s)) * T::lift(2.0) * decay;
         Ok(z.map(|x| x * slope))
     }
 
     fn normalization(&self) -> f64 {
-        gaussian_constant::<D>(INVERSE_ROOT_PI)
+        gaussian_constant::<D>(std::f64::consts::PI)
     }
 }
 

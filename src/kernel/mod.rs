@@ -130,15 +130,16 @@ pub trait SmoothingKernel<T: Scalar, const D: usize>: Kernel<T, D> {
     fn normalization(&self) -> f64;
 }
 
-/// 1/sqrt(pi) and 1/sqrt(2 pi), in two parts.
-const INVERSE_ROOT_PI: [f64; 2] = [0.564_189_583_547_756_3, 7.667_729_806_582_94e-18];
-const INVERSE_ROOT_TWO_PI: [f64; 2] = [0.398_942_280_401_432_7, -2.492_327_202_277_73e-17];
-
-/// root^D, rounded once: the constant in front of a Gaussian.
-fn gaussian_constant<const D: usize>(root: [f64; 2]) -> f64 {
+/// a^(-D/2), rounded about once, for the constant in front of a Gaussian.
+fn gaussian_constant<const D: usize>(a: f64) -> f64 {
+    let root = a.sqrt().recip();
+    let square = root * root;
+    // What the root and its square lack, so that the roundings do not add up over the product.
+    let lost = root.mul_add(root, -square);
+    let rest = 0.5 * root * ((-a).mul_add(square, 1.0) - a * lost);
     let (high, low) = (0..D).fold((1.0, 0.0), |(high, low): (f64, f64), _| {
-        let product = high * root[0];
-        (product, high.mul_add(root[0], -product) + (high * root[1] + low * root[0]))
+        let product = high * root;
+        (product, high.mul_add(root, -product) + (high * rest + low * root))
     });
     high + low
 }
