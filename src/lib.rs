@@ -56,7 +56,8 @@ pub use boundary::*;
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
 pub use error::*;
 pub use kernel::{
-    ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Rational, SmoothingKernel, WideGaussian,
+    CubicSpline, ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, LatticeHat, QuinticSpline, Rational,
+    RationalLaplacian, SmoothingKernel, WendlandC2, WendlandC4, WendlandC6, WideGaussian,
 };
 pub use linear::*;
 pub use moment::{

@@ -19,11 +19,13 @@ kinds! {
         } => "the exact kernel of degree {degree} and order {order} does not fit 128-bit rationals, or has too many monomials",
         /// A derivative of higher degree than the kernel has.
         Regularity {
+            /// The kernel, by the name of its type.
+            kernel: &'static str,
             /// Degree asked for.
             degree: u32,
             /// Highest degree the kernel is differentiable to.
             limit: u32,
-        } => "the kernel has derivatives to degree {limit}, not {degree}",
+        } => "{kernel} has derivatives to degree {limit}, not {degree}",
         /// A support radius or overlap limit that is not positive and finite, or whose square or volume is not.
         Radii {
             /// Support, in units of epsilon.

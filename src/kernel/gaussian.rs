@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, SQRT_2};
 
 use super::decay::{decay, in_lanes};
-use super::{Kernel, SmoothingKernel, gaussian_constant};
+use super::{Kernel, SmoothingKernel, gaussian_constant, laplacian};
 use crate::error::Result;
 use crate::multi_index::{MultiIndex, Term};
 use crate::scalar::Scalar;
@@ -157,12 +157,7 @@ pub struct WideGaussian<const D: usize> {
 impl<const D: usize> WideGaussian<D> {
     /// The kernel.
     pub fn new() -> Self {
-        let second = |axis| {
-            let mut exponents = [0; D];
-            exponents[axis] = 2;
-            Term { index: MultiIndex::new(exponents), factor: 1.0 }
-        };
-        Self { terms: std::array::from_fn(second), constant: gaussian_constant::<D>(4.0 * PI) }
+        Self { terms: laplacian(), constant: gaussian_constant::<D>(4.0 * PI) }
     }
 }
 

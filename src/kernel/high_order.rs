@@ -121,7 +121,12 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for HighOrderGaussian<D> {
         for &Term { index, .. } in terms {
             let degree = index.degree();
             if degree > Self::DERIVATIVE_LIMIT {
-                return Err(KernelError::Regularity { degree, limit: Self::DERIVATIVE_LIMIT }.into());
+                return Err(KernelError::Regularity {
+                    kernel: "HighOrderGaussian",
+                    degree,
+                    limit: Self::DERIVATIVE_LIMIT,
+                }
+                .into());
             }
         }
         in_lanes(z, out, |z| decay(z, 1.0).1);
@@ -165,7 +170,7 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for HighOrderGaussian<D> {
 
 /// Calls `visit(k, |k|)` for all k with 2k <= beta.
 #[inline]
-fn for_each_half<const D: usize>(beta: MultiIndex<D>, mut visit: impl FnMut(&[u8; D], u32)) {
+pub(super) fn for_each_half<const D: usize>(beta: MultiIndex<D>, mut visit: impl FnMut(&[u8; D], u32)) {
     let exponents = beta.exponents();
     let mut halves = [0_u8; D];
     loop {
@@ -180,7 +185,7 @@ fn for_each_half<const D: usize>(beta: MultiIndex<D>, mut visit: impl FnMut(&[u8
 
 /// 2^(n - 2k) n! / (k! (n - 2k)!).
 #[inline]
-fn constant(n: u8, k: u8) -> f64 {
+pub(super) fn constant(n: u8, k: u8) -> f64 {
     let (n, k) = (u32::from(n), u32::from(k));
     let mut factor = 1.0;
     for i in 0..k {

@@ -1,19 +1,28 @@
 //! Kernels: smoothing W, exchange eta^beta. A kernel is unscaled (epsilon = 1); methods scale it.
 
+mod compact;
 mod decay;
 mod derivation;
 mod exchange;
 mod gaussian;
 mod harmonic;
 mod high_order;
+mod lattice_hat;
 mod polynomial;
 mod rational;
+mod rational_laplacian;
+mod spline;
+mod wendland;
 
 pub use exchange::Exchange;
 pub use gaussian::{Gaussian, WideGaussian};
 pub use high_order::HighOrderGaussian;
+pub use lattice_hat::LatticeHat;
 pub use polynomial::ExactPolynomial;
 pub use rational::Rational;
+pub use rational_laplacian::RationalLaplacian;
+pub use spline::{CubicSpline, QuinticSpline};
+pub use wendland::{WendlandC2, WendlandC4, WendlandC6};
 
 use crate::error::Result;
 use crate::multi_index::{MultiIndex, Term};
@@ -128,6 +137,15 @@ pub trait SmoothingKernel<T: Scalar, const D: usize>: Kernel<T, D> {
 
     /// The constant in front of the profile that makes Int W = 1.
     fn normalization(&self) -> f64;
+}
+
+/// The terms of the Laplacian, sum_i D^2_i.
+fn laplacian<const D: usize>() -> [Term<D>; D] {
+    std::array::from_fn(|axis| {
+        let mut exponents = [0; D];
+        exponents[axis] = 2;
+        Term { index: MultiIndex::new(exponents), factor: 1.0 }
+    })
 }
 
 /// a^(-D/2), rounded about once, for the constant in front of a Gaussian.
