@@ -1,5 +1,7 @@
-//! Kernels: smoothing W, exchange eta^beta. A kernel is unscaled (epsilon = 1); methods scale it.
+//! Kernels: smoothing W, exchange eta^beta, mesh kernels. A kernel is unscaled (epsilon = 1, or the spacing of the mesh);
+//! methods and meshes scale it.
 
+mod assignment;
 mod compact;
 mod decay;
 mod derivation;
@@ -7,17 +9,23 @@ mod exchange;
 mod gaussian;
 mod harmonic;
 mod high_order;
+mod interpolation;
+mod lambda;
 mod lattice_hat;
+mod mesh_kernel;
 mod polynomial;
 mod rational;
 mod rational_laplacian;
 mod spline;
 mod wendland;
 
+pub use assignment::{Cic, Ngp, Tsc};
 pub use exchange::Exchange;
 pub use gaussian::{Gaussian, WideGaussian};
 pub use high_order::HighOrderGaussian;
+pub use lambda::Lambda;
 pub use lattice_hat::LatticeHat;
+pub use mesh_kernel::MeshKernel;
 pub use polynomial::ExactPolynomial;
 pub use rational::Rational;
 pub use rational_laplacian::RationalLaplacian;
