@@ -41,6 +41,14 @@ pub(super) fn in_lanes<T: Scalar, const D: usize>(
 /// In `f64` the bits depend neither on L nor on the target.
 #[inline(always)]
 pub(super) fn decay<T: Scalar, const D: usize, const L: usize>(z: &[[T; D]; L], a: f64) -> ([T; L], [T; L]) {
+    let (high, low) = squares(z);
+    let a = T::lift(a);
+    (array::from_fn(|i| high[i] + low[i]), exponential(high.map(|high| a * high), low.map(|low| a * low)))
+}
+
+/// |z|^2 = high + low.
+#[inline(always)]
+fn squares<T: Scalar, const D: usize, const L: usize>(z: &[[T; D]; L]) -> ([T; L], [T; L]) {
     let shift = T::lift(grid::<T>());
     let (mut high, mut low) = ([T::zero(); L], [T::zero(); L]);
     for axis in 0..D {
@@ -51,8 +59,16 @@ pub(super) fn decay<T: Scalar, const D: usize, const L: usize>(z: &[[T; D]; L], 
             low[i] += (x - h) * (x + h);
         }
     }
-    let a = T::lift(a);
-    (array::from_fn(|i| high[i] + low[i]), exponential(high.map(|high| a * high), low.map(|low| a * low)))
+    (high, low)
+}
+
+/// |z|^2, rounded once where its root is below 45, above once an axis.
+#[inline(always)]
+pub(super) fn square_once<T: Scalar, const D: usize>(z: &[T; D]) -> T {
+    let ([high], [low]) = squares(&[*z]);
+    let sum = high + low;
+    // The low part of an infinite square is no number.
+    if sum.is_finite() { sum } else { high }
 }
 
 /// 3/2 of the power of two that leaves multiples of 2^-21 in double precision and 2^-7 in single precision: squares of such
