@@ -41,6 +41,7 @@ mod exp;
 mod kernel;
 mod lanes;
 mod linear;
+mod mesh;
 mod moment;
 mod multi_index;
 mod neighbors;
@@ -56,9 +57,12 @@ pub use boundary::*;
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
 pub use error::*;
 pub use kernel::{
-    ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Rational, SmoothingKernel, WideGaussian,
+    Cic, CubicSpline, ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Lambda, LatticeHat, MeshKernel,
+    Ngp, QuinticSpline, Rational, RationalLaplacian, SmoothingKernel, Tsc, WendlandC2, WendlandC4, WendlandC6,
+    WideGaussian,
 };
 pub use linear::*;
+pub use mesh::{Centering, Dropped, Mesh, MeshStencil, Remeshed};
 pub use moment::{
     CenterTerm, Cholesky, Ladder, Lu, MomentScratch, MomentSolver, MomentSystem, PivotedQr, Qr, Quadrature, Residual,
     Rung, Solution, Window, continuous_moment, continuous_moments, discrete_moment, discrete_moments,
