@@ -51,7 +51,7 @@ mod scale;
 mod stencil;
 mod time;
 
-pub use apply::{Apply, Field, Histogram, MatrixFree, RawRows, Report, Row, Rows, Strided, Vector};
+pub use apply::{Apply, Field, Histogram, MatrixFree, RawRows, Report, Row, Rows, Strided, SymmetricPse, Vector};
 pub use boundary::*;
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
 pub use error::*;
@@ -66,8 +66,8 @@ pub use moment::{
 };
 pub use multi_index::*;
 pub use neighbors::{
-    BruteForce, Canonical, CellList, Nearest, NeighborList, Neighbors, epsilon_from_neighbors, mean_neighbor_distance,
-    volumes_from_neighbors,
+    BruteForce, Canonical, CellList, HalfList, Nearest, NeighborList, Neighbors, Pair, Symmetry, VerletList,
+    epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors,
 };
 pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};
