@@ -19,7 +19,7 @@ fn sizes() -> &'static [usize] {
 
 fn half_list(c: &mut Criterion) {
     let mut group = c.benchmark_group("Gaussian PSE 3D");
-    group.sample_size(10).warm_up_time(Duration::from_millis(500)).measurement_time(Duration::from_secs(4));
+    group.sample_size(10).warm_up_time(Duration::from_millis(500)).measurement_time(Duration::from_secs(3));
     for &m in sizes() {
         let lattice = Particles::jittered([0.0; 3], [1.0; 3], [m; 3], 0.3, 1).expect("a legal lattice");
         let domain = Domain::periodic([0.0; 3], [1.0; 3]).expect("a legal box");

@@ -29,6 +29,7 @@
 //!
 //! # Features
 //! `faer`: sparse LU for coupled boundary conditions and steady problems; matrices as those of that package.
+//! `kiddo`: a neighbor provider over an immutable k-d tree.
 //! `rayon`: rows are built and applied by several threads, with the same bits for any number of them.
 //! `serde`: rows and reports saved and read back bit for bit.
 //! `testing`: conformance checkers for kernels, providers, methods and steppers, ours and the user's own.
@@ -65,6 +66,8 @@ pub use moment::{
     moment_conditions, required_moment,
 };
 pub use multi_index::*;
+#[cfg(feature = "kiddo")]
+pub use neighbors::KdTree;
 pub use neighbors::{
     BruteForce, Canonical, CellList, HalfList, Nearest, NeighborList, Neighbors, Pair, Symmetry, VerletList,
     epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors,

@@ -19,6 +19,11 @@ kinds! {
             /// Largest legal value.
             high: f64,
         } => "cutoff {cutoff:e} is outside {low:e} to {high:e}",
+        /// Points that the package of the feature `kiddo` makes no tree of.
+        Tree {
+            /// Points and images.
+            entries: usize,
+        } => "no k-d tree could be made of {entries} points and images",
         /// A skin that is negative or not finite.
         Skin {
             /// The skin.

@@ -269,10 +269,10 @@ pub(super) fn magnitude<const D: usize>(placed: &Placed<D>) -> f64 {
     points.flatten().fold(placed.domain.magnitude(), |high, x| x.abs().max(high))
 }
 
-type Ghosts<const D: usize> = (Vec<[f64; D]>, Vec<(u32, Image)>);
+pub(super) type Ghosts<const D: usize> = (Vec<[f64; D]>, Vec<(u32, Image)>);
 
 /// The images of all sources within `reach` of the box, where they lie and whose they are.
-fn ghosts<const D: usize>(placed: &Placed<D>, reach: f64) -> Result<Ghosts<D>> {
+pub(super) fn ghosts<const D: usize>(placed: &Placed<D>, reach: f64) -> Result<Ghosts<D>> {
     let (mut positions, mut origins) = (Vec::new(), Vec::new());
     for (source, point) in (0..).zip(&placed.sources) {
         placed.domain.for_images(point, reach, |image| {

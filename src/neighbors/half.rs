@@ -102,7 +102,8 @@ impl<const D: usize> HalfList<D> {
                         }
                     })
                 };
-                (Rows::Linked(Arc::clone(&placed), part(true)?), Rows::Linked(placed.clone(), part(false)?))
+                let linked = |links| Rows::Linked(Arc::clone(&placed), Arc::new(links));
+                (linked(part(true)?), linked(part(false)?))
             }
             rows => compared(&rows, targets, cutoff.0)?,
         };
@@ -286,5 +287,5 @@ fn compared<const D: usize>(rows: &Rows<D>, targets: usize, cutoff: f64) -> Resu
         }
     }
     let [mutual, single] = halves;
-    Ok((Rows::Measured(mutual), Rows::Measured(single)))
+    Ok((Rows::Measured(Arc::new(mutual)), Rows::Measured(Arc::new(single))))
 }

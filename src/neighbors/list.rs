@@ -66,7 +66,7 @@ impl<const D: usize> NeighborList<D> {
                 blocks.push(block.pack()?);
             }
         }
-        list.rows = Rows::Measured(blocks);
+        list.rows = Rows::Measured(Arc::new(blocks));
         Ok(list)
     }
 
@@ -77,7 +77,7 @@ impl<const D: usize> NeighborList<D> {
         for p in 0..targets {
             list.end_row(targets, placed.center(p), placed.cutoff);
         }
-        list.rows = Rows::Linked(Arc::clone(placed), links);
+        list.rows = Rows::Linked(Arc::clone(placed), Arc::new(links));
         Ok(list)
     }
 
@@ -123,7 +123,7 @@ impl<const D: usize> NeighborList<D> {
                 blocks.push(block.pack()?);
             }
         }
-        list.rows = Rows::Measured(blocks);
+        list.rows = Rows::Measured(Arc::new(blocks));
         Ok(list)
     }
 
@@ -167,6 +167,10 @@ impl<const D: usize> NeighborList<D> {
         Self::from_rows(particles.len(), &centers, offsets, &neighbors, cutoff, particles.generation())
     }
 
+    pub(super) fn into_rows(self) -> Rows<D> {
+        self.rows
+    }
+
     /// How many neighbors all rows hold together.
     pub fn total(&self) -> usize {
         self.rows.total()
@@ -175,7 +179,7 @@ impl<const D: usize> NeighborList<D> {
     fn with_room(targets: usize, sources: usize, reach: f64, generation: u64) -> Result<Self> {
         check_count(sources, PARTICLES_HIGH)?;
         let (centers, cutoffs) = (reserved(targets)?, reserved(targets)?);
-        Ok(Self { sources, owned: sources, centers, cutoffs, reach, generation, rows: Rows::Measured(Vec::new()) })
+        Ok(Self { sources, owned: sources, centers, cutoffs, reach, generation, rows: Rows::Measured(Arc::default()) })
     }
 
     /// Notes center and cutoff of the next target; whether a block of rows ends here.
@@ -224,10 +228,8 @@ impl<const D: usize> Neighbors<D> for NeighborList<D> {
         row.reset(p, self.center(p), cutoff);
         self.rows.gather(p, cutoff, cutoff >= self.reach, row);
     }
-}
 
-impl<const D: usize> NeighborList<D> {
-    pub(super) fn into_rows(self) -> Rows<D> {
-        self.rows
+    fn stored(&self) -> Result<Self> {
+        Ok(self.clone())
     }
 }

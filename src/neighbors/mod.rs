@@ -17,6 +17,8 @@ mod placed;
 mod row_check;
 mod rows;
 mod table;
+#[cfg(feature = "kiddo")]
+mod tree;
 mod verlet;
 
 pub use brute_force::BruteForce;
@@ -27,6 +29,8 @@ pub use list::NeighborList;
 pub use measure::{epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors};
 pub use nearest::Nearest;
 pub use pair::{Pair, Symmetry};
+#[cfg(feature = "kiddo")]
+pub use tree::KdTree;
 pub use verlet::VerletList;
 
 use crate::error::Result;

@@ -7,11 +7,11 @@ use super::links::Links;
 use super::placed::Placed;
 use crate::stencil::{Neighbor, Stencil};
 
-/// Rows of a few thousand targets each.
+/// Rows of a few thousand targets each; clones share them.
 #[derive(Clone, Debug)]
 pub(super) enum Rows<const D: usize> {
-    Measured(Vec<Block<D>>),
-    Linked(Arc<Placed<D>>, Vec<Links>),
+    Measured(Arc<Vec<Block<D>>>),
+    Linked(Arc<Placed<D>>, Arc<Vec<Links>>),
 }
 
 impl<const D: usize> Rows<D> {
