@@ -53,14 +53,16 @@ mod scale;
 mod stencil;
 mod time;
 
-pub use apply::{Apply, Field, Histogram, MatrixFree, RawRows, Report, Row, Rows, Strided, SymmetricPse, Vector};
+pub use apply::{
+    Apply, Field, Histogram, MatrixFree, RawRows, Report, Row, Rows, Strided, SymmetricPse, UpwindRows, Vector,
+};
 pub use boundary::*;
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
 pub use error::*;
 pub use kernel::{
-    Cic, CubicSpline, ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Lambda, LatticeHat, MeshKernel,
-    Ngp, QuinticSpline, Rational, RationalLaplacian, SmoothingKernel, Tsc, WendlandC2, WendlandC4, WendlandC6,
-    WideGaussian,
+    AnisotropicGaussian, Cic, CubicSpline, ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Lambda,
+    LatticeHat, MeshKernel, Ngp, OneSidedGaussian, QuinticSpline, Rational, RationalLaplacian, SmoothingKernel, Tsc,
+    WendlandC2, WendlandC4, WendlandC6, WideGaussian,
 };
 pub use linear::*;
 pub use mesh::{Centering, Dropped, Mesh, MeshStencil, Remeshed};
@@ -73,14 +75,14 @@ pub use multi_index::*;
 #[cfg(feature = "kiddo")]
 pub use neighbors::KdTree;
 pub use neighbors::{
-    BruteForce, Canonical, CellList, HalfList, Nearest, NeighborList, Neighbors, Pair, Symmetry, VerletList,
+    BruteForce, Canonical, CellList, HalfList, Nearest, NeighborList, Neighbors, Pair, Selected, Symmetry, VerletList,
     epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors,
 };
 pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};
 pub use scalar::Scalar;
 pub use scale::{Cutoff, Epsilon, Spacing, Volumes};
-pub use stencil::{Neighbor, Stencil};
+pub use stencil::{Neighbor, Side, Stencil};
 pub use time::*;
 
 #[cfg(feature = "testing")]
