@@ -275,7 +275,7 @@ fn values_weights_and_derivatives_equal_the_exact_polynomials() {
         }
         let beyond = kernel.derivative(R as u32 + 1, 0.3).unwrap_err();
         let degree = R as u32 + 1;
-        assert_eq!(beyond, Error::from(KernelError::Regularity { degree, limit: R as u32 }));
+        assert_eq!(beyond, Error::from(KernelError::Regularity { kernel: "Lambda", degree, limit: R as u32 }));
     }
     each_golden!(check);
 }

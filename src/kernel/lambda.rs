@@ -93,7 +93,7 @@ impl<const P: usize, const R: usize> Lambda<P, R> {
     /// [`KernelError::Regularity`] for m > R, where the derivative jumps at the integers.
     pub fn derivative<T: Scalar>(&self, degree: u32, s: T) -> Result<T> {
         if degree as usize > R {
-            return Err(KernelError::Regularity { degree, limit: R as u32 }.into());
+            return Err(KernelError::Regularity { kernel: "Lambda", degree, limit: R as u32 }.into());
         }
         Ok(self.differentiated(degree, s))
     }
