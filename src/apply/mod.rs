@@ -15,6 +15,7 @@ mod splice;
 mod strided;
 mod sweep;
 mod symmetric;
+mod upwind;
 mod vector;
 mod worker;
 
@@ -25,6 +26,7 @@ pub use report::Report;
 pub use rows::{Row, Rows};
 pub use strided::Strided;
 pub use symmetric::SymmetricPse;
+pub use upwind::UpwindRows;
 pub use vector::Vector;
 
 use num_traits::AsPrimitive;

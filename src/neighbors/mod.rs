@@ -16,6 +16,7 @@ mod pair;
 mod placed;
 mod row_check;
 mod rows;
+mod selected;
 mod table;
 #[cfg(feature = "kiddo")]
 mod tree;
@@ -29,6 +30,7 @@ pub use list::NeighborList;
 pub use measure::{epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors};
 pub use nearest::Nearest;
 pub use pair::{Pair, Symmetry};
+pub use selected::Selected;
 #[cfg(feature = "kiddo")]
 pub use tree::KdTree;
 pub use verlet::VerletList;
