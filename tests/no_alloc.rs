@@ -187,6 +187,33 @@ fn applying_stored_rows_allocates_nothing_and_matrix_free_nothing_after_the_firs
 
 #[cfg(not(feature = "rayon"))]
 #[test]
+fn sums_over_pairs_allocate_nothing_and_symmetric_pse_nothing_after_the_first_time() {
+    let (particles, domain) = particles();
+    let (n, pse) = (particles.len(), laplacian(&particles));
+    let cells = CellList::build(&particles, &domain, pse.cutoff()).unwrap();
+    let half = pse.symmetric(&cells).unwrap();
+    let (f, mut out) = (vec![1.0; n], vec![0.0; n]);
+    half.apply(&f, &mut out).unwrap();
+    assert_eq!(allocations(|| half.apply(&f, &mut out).unwrap()), 0);
+    let mut sums = vec![[0.0; 2]; n];
+    let symmetry = [parops::Symmetry::Conserved; 2];
+    assert_eq!(allocations(|| half.pairs().accumulate(symmetry, &mut sums, |pair| pair.separation).unwrap()), 0);
+}
+
+#[test]
+fn updates_that_reuse_the_rows_of_a_verlet_list_allocate_nothing() {
+    let (particles, domain) = particles();
+    let mut list = parops::VerletList::build(&particles, &domain, parops::Cutoff(0.1), 0.05).unwrap();
+    for by in [0.01, -0.015, 0.0] {
+        let mut moved = particles.clone();
+        moved.set_points(&particles.points().iter().map(|x| x.map(|x| x + by)).collect::<Vec<_>>()).unwrap();
+        assert_eq!(allocations(|| assert_eq!(list.update(&moved), Ok(false))), 0);
+        assert_eq!(allocations(|| assert!((0..particles.len()).all(|p| list.count(p, 0.1) > 10))), 0);
+    }
+}
+
+#[cfg(not(feature = "rayon"))]
+#[test]
 fn solves_after_the_first_allocate_nothing() -> parops::Result<()> {
     let (n, chain) = (300, |i: usize| [(i, i, 4.0), (i, (i + 1) % 300, -1.0), (i, (i + 17) % 300, -2.0)]);
     let matrix = parops::CsrMatrix::from_triplets(n, n, (0..n).flat_map(chain))?;

@@ -222,7 +222,7 @@ fn rows_that_change_when_asked_again_are_caught() {
     assert_eq!(check_provider(&unsteady), Err(ProviderFault::Unsteady { p: 0 }));
 }
 
-/// A sphere of points, each perturbed a hundred times with every provider built anew.
+/// A hundred random sets of four shapes and five sizes in domains of all kinds of faces, each built anew.
 fn after_updates<const D: usize, P: Neighbors<D>>(build: impl Fn(&Particles<D>, &Domain<D>, Cutoff) -> P, seed: u64) {
     const AXES: [[Face; 2]; 4] = [
         [Face::Periodic, Face::Periodic],
@@ -253,6 +253,13 @@ fn cell_lists_equal_brute_force_on_a_hundred_random_sets() {
     after_updates::<1, _>(|particles, domain, cutoff| CellList::build(particles, domain, cutoff).unwrap(), 1);
     after_updates::<2, _>(|particles, domain, cutoff| CellList::build(particles, domain, cutoff).unwrap(), 2);
     after_updates::<3, _>(|particles, domain, cutoff| CellList::build(particles, domain, cutoff).unwrap(), 3);
+}
+
+#[test]
+fn nearest_neighbors_equal_brute_force_on_a_hundred_random_sets() {
+    after_updates::<1, _>(|particles, domain, _| Nearest::build(particles, domain, 6).unwrap(), 4);
+    after_updates::<2, _>(|particles, domain, _| Nearest::build(particles, domain, 9).unwrap(), 5);
+    after_updates::<3, _>(|particles, domain, _| Nearest::build(particles, domain, 12).unwrap(), 6);
 }
 
 #[cfg(feature = "kiddo")]
