@@ -1,7 +1,8 @@
 //! Smoothing kernels of order above 2: the identity kernels, a polynomial times exp(-|z|^2).
 
-use super::exchange::{Exchange, horner};
-use super::{Kernel, SmoothingKernel};
+use super::decay::{decay, in_lanes};
+use super::exchange::{Exchange, horner, radial_profile};
+use super::{BLOCK, Kernel, SmoothingKernel, gaussian_constant};
 use crate::error::{KernelError, Result};
 use crate::multi_index::{MultiIndex, Term};
 use crate::scalar::{Scalar, square};
@@ -75,8 +76,13 @@ impl<const D: usize> HighOrderGaussian<D> {
 impl<T: Scalar, const D: usize> Kernel<T, D> for HighOrderGaussian<D> {
     #[inline]
     fn value(&self, z: &[T; D]) -> T {
-        let s = square(z);
-        horner(&self.profiles[0], s) * (-s).exp()
+        let [value] = radial_profile(&self.profiles[0][..self.coefficients], &[*z]);
+        value
+    }
+
+    fn values(&self, z: &[[T; D]], out: &mut [T]) {
+        let radial = &self.profiles[0][..self.coefficients];
+        in_lanes(z, out, |z| radial_profile(radial, z));
     }
 
     fn terms(&self) -> &[Term<D>] {
@@ -112,8 +118,7 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for HighOrderGaussian<D> {
     }
 
     fn combination(&self, terms: &[Term<D>], z: &[[T; D]], out: &mut [T]) -> Result<()> {
-        out.fill(T::zero());
-        for &Term { index, factor } in terms {
+        for &Term { index, .. } in terms {
             let degree = index.degree();
             if degree > Self::DERIVATIVE_LIMIT {
                 return Err(KernelError::Regularity {
@@ -123,35 +128,43 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for HighOrderGaussian<D> {
                 }
                 .into());
             }
-            for_each_half(index, |halves, taken| {
-                let radial = self.differentiated(degree - taken);
-                let radial = &radial[..self.coefficients];
-                let mut front = T::lift(factor);
-                let mut exponents = index.exponents();
-                for (n, &k) in exponents.iter_mut().zip(halves) {
-                    front *= T::lift(constant(*n, k));
-                    *n -= 2 * k;
-                }
-                let monomial = MultiIndex::new(exponents);
-                for (z, out) in z.iter().zip(&mut *out) {
-                    *out += front * monomial.power(z) * horner(radial, square(z));
-                }
-            });
         }
-        for (z, out) in z.iter().zip(out) {
-            *out *= (-square(z)).exp();
+        in_lanes(z, out, |z| decay(z, 1.0).1);
+        let mut sums = [T::zero(); BLOCK];
+        for (z, out) in z.chunks(BLOCK).zip(out.chunks_mut(BLOCK)) {
+            let sums = &mut sums[..z.len()];
+            sums.fill(T::zero());
+            for &Term { index, factor } in terms {
+                for_each_half(index, |halves, taken| {
+                    let radial = self.differentiated(index.degree() - taken);
+                    let radial = &radial[..self.coefficients];
+                    let mut front = T::lift(factor);
+                    let mut exponents = index.exponents();
+                    for (n, &k) in exponents.iter_mut().zip(halves) {
+                        front *= T::lift(constant(*n, k));
+                        *n -= 2 * k;
+                    }
+                    let monomial = MultiIndex::new(exponents);
+                    for (z, sum) in z.iter().zip(&mut *sums) {
+                        *sum += front * monomial.power(z) * horner(radial, square(z));
+                    }
+                });
+            }
+            for (out, &sum) in out.iter_mut().zip(&*sums) {
+                *out *= sum;
+            }
         }
         Ok(())
     }
 
     fn gradient(&self, z: &[T; D]) -> Result<[T; D]> {
-        let s = square(z);
-        let slope = (horner(&self.profiles[1], s) - horner(&self.profiles[0], s)) * T::lift(2.0) * (-s).exp();
+        let ([s], [decay]) = decay(&[*z], 1.0);
+        let slope = (horner(&self.profiles[1], s) - horner(&self.profiles[0], s)) * T::lift(2.0) * decay;
         Ok(z.map(|x| x * slope))
     }
 
     fn normalization(&self) -> f64 {
-        super::gaussian_constant::<D>(std::f64::consts::PI)
+        gaussian_constant::<D>(std::f64::consts::PI)
     }
 }
 

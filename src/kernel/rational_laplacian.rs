@@ -2,9 +2,10 @@
 
 use std::f64::consts::PI;
 
+use super::decay::square_once;
 use super::{Kernel, laplacian};
 use crate::multi_index::Term;
-use crate::scalar::{Scalar, square};
+use crate::scalar::Scalar;
 
 /// The kernel eta(z) = 15/(pi^2 (1 + |z|^10)), an exchange kernel of the Laplacian in three dimensions to order 2.
 ///
@@ -56,7 +57,7 @@ impl Default for RationalLaplacian {
 impl<T: Scalar> Kernel<T, 3> for RationalLaplacian {
     #[inline]
     fn value(&self, z: &[T; 3]) -> T {
-        let s = square(z);
+        let s = square_once(z);
         let fourth = s * s;
         T::lift(15.0 / (PI * PI)) / (T::one() + fourth * fourth * s)
     }
