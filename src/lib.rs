@@ -52,14 +52,14 @@ mod scale;
 mod stencil;
 mod time;
 
-pub use apply::{Apply, Field, Histogram, MatrixFree, RawRows, Report, Row, Rows, Strided, Vector};
+pub use apply::{Apply, Field, Histogram, MatrixFree, RawRows, Report, Row, Rows, Strided, UpwindRows, Vector};
 pub use boundary::*;
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
 pub use error::*;
 pub use kernel::{
-    Cic, CubicSpline, ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Lambda, LatticeHat, MeshKernel,
-    Ngp, QuinticSpline, Rational, RationalLaplacian, SmoothingKernel, Tsc, WendlandC2, WendlandC4, WendlandC6,
-    WideGaussian,
+    AnisotropicGaussian, Cic, CubicSpline, ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Lambda,
+    LatticeHat, MeshKernel, Ngp, OneSidedGaussian, QuinticSpline, Rational, RationalLaplacian, SmoothingKernel, Tsc,
+    WendlandC2, WendlandC4, WendlandC6, WideGaussian,
 };
 pub use linear::*;
 pub use mesh::{Centering, Dropped, Mesh, MeshStencil, Remeshed};
@@ -70,14 +70,14 @@ pub use moment::{
 };
 pub use multi_index::*;
 pub use neighbors::{
-    BruteForce, Canonical, CellList, Nearest, NeighborList, Neighbors, epsilon_from_neighbors, mean_neighbor_distance,
-    volumes_from_neighbors,
+    BruteForce, Canonical, CellList, Nearest, NeighborList, Neighbors, Selected, epsilon_from_neighbors,
+    mean_neighbor_distance, volumes_from_neighbors,
 };
 pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};
 pub use scalar::Scalar;
 pub use scale::{Cutoff, Epsilon, Spacing, Volumes};
-pub use stencil::{Neighbor, Stencil};
+pub use stencil::{Neighbor, Side, Stencil};
 pub use time::*;
 
 #[cfg(feature = "testing")]

@@ -17,17 +17,17 @@ pub fn panels(degree: u8, points: usize, claims: &mut Claims) -> Result<Vec<(Axe
     };
     let axes = [title, "eta', same colors"].map(|title| Axes { title, x: "z", y: "", logarithmic: false });
     let mut curves = [Vec::new(), Vec::new()];
-        for (color, order) in [2, 4, 6, 8].into_iter().enumerate() {
-            let kernel = Exchange::new(&[Term { index: MultiIndex::new([degree]), factor: 1.0 }], order)?;
-            moments(&format!("beta = {degree}, r = {order}"), &kernel, u32::from(degree), order, claims);
-            draw(&mut curves, &format!("r = {order}"), &kernel, points, color);
-        }
-        if degree == 2 {
-            let wide = WideGaussian::<1>::new();
-            moments("wide Gaussian", &wide, 2, 2, claims);
-            draw(&mut curves, "wide, r = 2", &wide, points, 4);
-        }
-        Ok(axes.into_iter().zip(curves).collect())
+    for (color, order) in [2, 4, 6, 8].into_iter().enumerate() {
+        let kernel = Exchange::new(&[Term { index: MultiIndex::new([degree]), factor: 1.0 }], order)?;
+        moments(&format!("beta = {degree}, r = {order}"), &kernel, u32::from(degree), order, claims);
+        draw(&mut curves, &format!("r = {order}"), &kernel, points, color);
+    }
+    if degree == 2 {
+        let wide = WideGaussian::<1>::new();
+        moments("wide Gaussian", &wide, 2, 2, claims);
+        draw(&mut curves, "wide, r = 2", &wide, points, 4);
+    }
+    Ok(axes.into_iter().zip(curves).collect())
 }
 
 fn draw<K>(curves: &mut [Vec<Curve>; 2], name: &str, kernel: &K, points: usize, color: usize)

@@ -9,7 +9,11 @@ const REACH: f64 = 5.0;
 
 /// One panel a degree of the derivative, as far as the regularity goes.
 pub fn panels(points: usize, claims: &mut Claims) -> Result<Vec<(Axes<'static>, Vec<Curve>)>> {
-    let titles = ["Remeshing kernels Lambda_{P,R}, even in s", "first derivative, same colors", "second derivative, same colors"];
+    let titles = [
+        "Remeshing kernels Lambda_{P,R}, even in s",
+        "first derivative, same colors",
+        "second derivative, same colors",
+    ];
     let mut panels: Vec<_> = titles.map(|title| (Axes { title, x: "s", y: "", logarithmic: false }, Vec::new())).into();
     let curves = panels.iter_mut().map(|(_, curves)| curves).collect::<Vec<_>>();
     let mut gallery = Gallery { points, claims, curves, color: 0 };

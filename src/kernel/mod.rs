@@ -1,6 +1,7 @@
 //! Kernels: smoothing W, exchange eta^beta, mesh kernels. A kernel is unscaled (epsilon = 1, or the spacing of the mesh);
 //! methods and meshes scale it.
 
+mod anisotropic;
 mod assignment;
 mod compact;
 mod decay;
@@ -13,12 +14,15 @@ mod interpolation;
 mod lambda;
 mod lattice_hat;
 mod mesh_kernel;
+mod one_sided;
 mod polynomial;
 mod rational;
 mod rational_laplacian;
 mod spline;
+mod twofold;
 mod wendland;
 
+pub use anisotropic::AnisotropicGaussian;
 pub use assignment::{Cic, Ngp, Tsc};
 pub use exchange::Exchange;
 pub use gaussian::{Gaussian, WideGaussian};
@@ -26,6 +30,8 @@ pub use high_order::HighOrderGaussian;
 pub use lambda::Lambda;
 pub use lattice_hat::LatticeHat;
 pub use mesh_kernel::MeshKernel;
+pub use one_sided::OneSidedGaussian;
+pub(crate) use one_sided::along_axis;
 pub use polynomial::ExactPolynomial;
 pub use rational::Rational;
 pub use rational_laplacian::RationalLaplacian;
