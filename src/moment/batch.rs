@@ -1,12 +1,12 @@
 //! Moment systems of several stencils at once: Cholesky across lanes, one stencil a lane.
 
-use super::monomials::{Monomials, add_powers, polynomial};
+use super::monomials::{AddPowers, Monomials, polynomial};
 use super::nodes::{GROUP, Group, Nodes};
 use super::solver::{Rung, Solution, worst};
 use super::system::{MomentSystem, Residual};
 use super::triangle::{Layout, Pair};
 use super::window::Window;
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, Vectors, Work, widest};
 use crate::multi_index::MultiIndex;
 
 /// A [`MomentSystem`] laid out for several stencils side by side: [`Cholesky`](super::Cholesky) with its corrected step,
@@ -127,12 +127,25 @@ impl<const D: usize> BatchSystem<D> {
         scratch: &mut BatchScratch<L>,
         w: [&mut [f64]; L],
     ) -> [Option<Solution<f64>>; L] {
+        widest(Batch { system: self, z, window, radius, scratch, w })
+    }
+
+    #[inline(always)]
+    fn solve_with<V: Vectors, const L: usize>(
+        &self,
+        vectors: V,
+        z: [&[[f64; D]]; L],
+        window: Window,
+        radius: [f64; L],
+        scratch: &mut BatchScratch<L>,
+        w: [&mut [f64]; L],
+    ) -> [Option<Solution<f64>>; L] {
         if self.conditions == 0 {
             return [None; L];
         }
         let counts = z.map(<[_]>::len);
         scratch.nodes.load(z, window, radius);
-        self.accumulate(scratch);
+        self.accumulate(vectors, scratch);
         let layout = Layout { size: self.conditions, extra: self.outputs + 1 };
         self.fill(layout, scratch);
         let largest = self.largest_eigenvalue(layout, scratch);
@@ -154,7 +167,7 @@ impl<const D: usize> BatchSystem<D> {
         for k in 0..self.outputs {
             take_row(layout, k, scratch);
             layout.backward(&scratch.matrix, &scratch.inverse, &mut scratch.x);
-            let mut measured = self.weigh(k, None, scratch);
+            let mut measured = self.weigh(vectors, k, None, scratch);
             let mut poor = Lanes::ZERO;
             for (i, solution) in solutions.iter_mut().enumerate() {
                 let row = Solution { residual: measured[i], ..*solution };
@@ -170,7 +183,7 @@ impl<const D: usize> BatchSystem<D> {
                 }
                 layout.forward(matrix, inverse, x);
                 layout.backward(matrix, inverse, x);
-                measured = self.weigh(k, Some(poor), scratch);
+                measured = self.weigh(vectors, k, Some(poor), scratch);
             }
             for (solution, &measured) in solutions.iter_mut().zip(&measured) {
                 solution.residual = worst(solution.residual, measured);
@@ -191,23 +204,26 @@ impl<const D: usize> BatchSystem<D> {
         std::array::from_fn(|i| (sound.0[i] != 0.0).then_some(solutions[i]))
     }
 
+    #[inline(always)]
     fn required_of(&self, k: usize) -> &[f64] {
         &self.required[k * self.conditions..][..self.conditions]
     }
 
     /// M_gamma = sum_q phi_q z_q^gamma.
-    fn accumulate<const L: usize>(&self, scratch: &mut BatchScratch<L>) {
+    #[inline(always)]
+    fn accumulate<V: Vectors, const L: usize>(&self, vectors: V, scratch: &mut BatchScratch<L>) {
         let BatchScratch { nodes, powers, moments, .. } = scratch;
         moments.clear();
         moments.resize(self.monomials.len(), Lanes::ZERO);
         powers.resize(self.monomials.len(), [Lanes::ZERO; GROUP]);
         for (places, &window) in nodes.iter::<D>() {
             powers[0] = window;
-            add_powers(self.monomials.runs(2 * self.high), places, powers, moments);
+            vectors.run(AddPowers { runs: self.monomials.runs(2 * self.high), places, powers, sums: moments });
         }
     }
 
     /// Writes A, and below it the right-hand sides, the last of which starts the inverse iterations.
+    #[inline(always)]
     fn fill<const L: usize>(&self, layout: Layout, scratch: &mut BatchScratch<L>) {
         let BatchScratch { moments, matrix, norms, scales, .. } = scratch;
         matrix.clear();
@@ -241,6 +257,7 @@ impl<const D: usize> BatchSystem<D> {
 
     /// The largest eigenvalue of A in the scaling of B, from below: one power iteration from the leaders and the Rayleigh
     /// quotient of what it gives.
+    #[inline(always)]
     fn largest_eigenvalue<const L: usize>(&self, layout: Layout, scratch: &mut BatchScratch<L>) -> Lanes<L> {
         let BatchScratch { moments, matrix, scales, x, .. } = scratch;
         x.clear();
@@ -259,6 +276,7 @@ impl<const D: usize> BatchSystem<D> {
     }
 
     /// The largest eigenvalue of A^-1 in the scaling of B, from below: two inverse iterations.
+    #[inline(always)]
     fn smallest_inverse<const L: usize>(&self, layout: Layout, scratch: &mut BatchScratch<L>) -> Lanes<L> {
         take_row(layout, self.outputs, scratch);
         let BatchScratch { matrix, inverse, norms, x, .. } = scratch;
@@ -279,8 +297,10 @@ impl<const D: usize> BatchSystem<D> {
     }
 
     /// w = phi sum_j x_j z^alpha_j, or that added to w in the lanes `poor`, and by how much output k then misses.
-    fn weigh<const L: usize>(
+    #[inline(always)]
+    fn weigh<V: Vectors, const L: usize>(
         &self,
+        vectors: V,
         k: usize,
         poor: Option<Lanes<L>>,
         scratch: &mut BatchScratch<L>,
@@ -306,7 +326,7 @@ impl<const D: usize> BatchSystem<D> {
             }
             *weights = own;
             powers[0] = own;
-            add_powers(runs, places, powers, sums);
+            vectors.run(AddPowers { runs, places, powers, sums });
             for (sum, &at) in absolute.iter_mut().zip(&self.extremes) {
                 *sum = powers[at].iter().fold(*sum, |sum, &term| sum + term.abs());
             }
@@ -322,7 +342,28 @@ impl<const D: usize> BatchSystem<D> {
     }
 }
 
+/// [`BatchSystem::solve`] as work for any vectors.
+struct Batch<'a, const D: usize, const L: usize> {
+    system: &'a BatchSystem<D>,
+    z: [&'a [[f64; D]]; L],
+    window: Window,
+    radius: [f64; L],
+    scratch: &'a mut BatchScratch<L>,
+    w: [&'a mut [f64]; L],
+}
+
+impl<const D: usize, const L: usize> Work for Batch<'_, D, L> {
+    type Out = [Option<Solution<f64>>; L];
+
+    #[inline(always)]
+    fn run<V: Vectors>(self, vectors: V) -> Self::Out {
+        let Self { system, z, window, radius, scratch, w } = self;
+        system.solve_with(vectors, z, window, radius, scratch, w)
+    }
+}
+
 /// x <- row k below the triangle.
+#[inline(always)]
 fn take_row<const L: usize>(layout: Layout, k: usize, scratch: &mut BatchScratch<L>) {
     let (start, odd) = layout.row(k);
     scratch.x.clear();

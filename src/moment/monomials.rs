@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 
 use super::nodes::{GROUP, Group};
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, Vectors, Work};
 use crate::multi_index::{MultiIndex, graded};
 
 /// The monomials z^alpha with |alpha| <= a degree, in graded order.
@@ -64,27 +64,34 @@ impl<const D: usize> Monomials<D> {
 
 /// Multiplies powers[0] = c out to c z^alpha, and adds these to the sums over the neighbors.
 ///
-/// Not inlined: among the variables of its callers the places would not stay in registers, at a cost of 10 %.
-#[inline(never)]
-pub(super) fn add_powers<const L: usize>(
-    runs: &[Run],
-    places: &[Group<L>],
-    powers: &mut [Group<L>],
-    sums: &mut [Lanes<L>],
-) {
-    sums[0] = powers[0].iter().fold(sums[0], |sum, &power| sum + power);
-    for run in runs {
-        let z = places[run.axis];
-        let (parents, children) = powers.split_at_mut(run.child);
-        let parents = &parents[run.parent..][..run.len];
-        let (children, sums) = (&mut children[..run.len], &mut sums[run.child..][..run.len]);
-        for ((parent, child), sum) in parents.iter().zip(children).zip(sums) {
-            let mut total = *sum;
-            for q in 0..GROUP {
-                child[q] = parent[q] * z[q];
-                total += child[q];
+/// Called out of line: among the variables of its callers the places would not stay in registers, at a cost of 10 %.
+pub(super) struct AddPowers<'a, const L: usize> {
+    pub(super) runs: &'a [Run],
+    pub(super) places: &'a [Group<L>],
+    pub(super) powers: &'a mut [Group<L>],
+    pub(super) sums: &'a mut [Lanes<L>],
+}
+
+impl<const L: usize> Work for AddPowers<'_, L> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<V: Vectors>(self, _: V) {
+        let Self { runs, places, powers, sums } = self;
+        sums[0] = powers[0].iter().fold(sums[0], |sum, &power| sum + power);
+        for run in runs {
+            let z = places[run.axis];
+            let (parents, children) = powers.split_at_mut(run.child);
+            let parents = &parents[run.parent..][..run.len];
+            let (children, sums) = (&mut children[..run.len], &mut sums[run.child..][..run.len]);
+            for ((parent, child), sum) in parents.iter().zip(children).zip(sums) {
+                let mut total = *sum;
+                for q in 0..GROUP {
+                    child[q] = parent[q] * z[q];
+                    total += child[q];
+                }
+                *sum = total;
             }
-            *sum = total;
         }
     }
 }
@@ -117,6 +124,7 @@ pub(super) fn polynomial<const L: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lanes::widest;
 
     #[test]
     fn runs_make_every_monomial_in_graded_order() {
@@ -126,7 +134,8 @@ mod tests {
             let places = z.map(|z| [Lanes([z]); GROUP]);
             let mut powers = vec![[Lanes::ONE; GROUP]; monomials.len()];
             let mut sums = vec![Lanes::ZERO; monomials.len()];
-            add_powers(monomials.runs(degree as usize), &places, &mut powers, &mut sums);
+            let runs = monomials.runs(degree as usize);
+            widest(AddPowers { runs, places: &places, powers: &mut powers, sums: &mut sums });
             // Different primes: every value belongs to one multi-index.
             for (i, alpha) in graded::<D>(0, degree).enumerate() {
                 assert_eq!(powers[i], [Lanes([alpha.power(&z)]); GROUP], "{alpha}");
