@@ -52,11 +52,11 @@ fn squares<T: Scalar, const D: usize, const L: usize>(z: &[[T; D]; L]) -> ([T; L
     let shift = T::lift(grid::<T>());
     let (mut high, mut low) = ([T::zero(); L], [T::zero(); L]);
     for axis in 0..D {
+        let x = z.map(|z| z[axis]);
         for i in 0..L {
-            let x = z[i][axis];
-            let h = (x + shift) - shift;
+            let h = (x[i] + shift) - shift;
             high[i] += h * h;
-            low[i] += (x - h) * (x + h);
+            low[i] += (x[i] - h) * (x[i] + h);
         }
     }
     (high, low)
