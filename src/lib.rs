@@ -29,6 +29,7 @@
 //!
 //! # Features
 //! `faer`: sparse LU for coupled boundary conditions and steady problems; matrices as those of that package.
+//! `kiddo`: a neighbor provider over an immutable k-d tree.
 //! `rayon`: rows are built and applied by several threads, with the same bits for any number of them.
 //! `serde`: rows and reports saved and read back bit for bit.
 //! `testing`: conformance checkers for kernels, providers, methods and steppers, ours and the user's own.
@@ -52,7 +53,9 @@ mod scale;
 mod stencil;
 mod time;
 
-pub use apply::{Apply, Field, Histogram, MatrixFree, RawRows, Report, Row, Rows, Strided, UpwindRows, Vector};
+pub use apply::{
+    Apply, Field, Histogram, MatrixFree, RawRows, Report, Row, Rows, Strided, SymmetricPse, UpwindRows, Vector,
+};
 pub use boundary::*;
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
 pub use error::*;
@@ -69,9 +72,11 @@ pub use moment::{
     moment_conditions, required_moment,
 };
 pub use multi_index::*;
+#[cfg(feature = "kiddo")]
+pub use neighbors::KdTree;
 pub use neighbors::{
-    BruteForce, Canonical, CellList, Nearest, NeighborList, Neighbors, Selected, epsilon_from_neighbors,
-    mean_neighbor_distance, volumes_from_neighbors,
+    BruteForce, Canonical, CellList, HalfList, Nearest, NeighborList, Neighbors, Pair, Selected, Symmetry, VerletList,
+    epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors,
 };
 pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};

@@ -218,7 +218,6 @@ fn weights_add_up_to_one_within_four_eps_in_both_precisions() {
         let kernel = Lambda::<P, R>::new().unwrap();
         let double = worst_sum::<f64, S>(&kernel, f64::EPSILON, |x| x);
         let single = worst_sum::<f32, S>(&kernel, f32::EPSILON.into(), f64::from);
-        println!("({P}, {R}): {double} and {single} eps");
         assert!(double <= LIMIT && single <= LIMIT, "({P}, {R}): {double} and {single} eps");
     }
     each_golden!(check);
@@ -276,7 +275,7 @@ fn values_weights_and_derivatives_equal_the_exact_polynomials() {
         }
         let beyond = kernel.derivative(R as u32 + 1, 0.3).unwrap_err();
         let degree = R as u32 + 1;
-        assert_eq!(beyond, Error::from(KernelError::Regularity { degree, limit: R as u32 }));
+        assert_eq!(beyond, Error::from(KernelError::Regularity { kernel: "Lambda", degree, limit: R as u32 }));
     }
     each_golden!(check);
 }

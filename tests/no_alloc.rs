@@ -221,3 +221,25 @@ fn imposing_boundary_conditions_allocates_nothing_after_the_first_time() {
     assert_eq!(allocations(|| (0..5).for_each(|n| impose(f64::from(n)))), 0);
     assert_eq!(allocations(|| boundary.replace_values(|_| 0.0, &mut u).unwrap()), 0);
 }
+
+#[test]
+fn transfers_between_particles_and_mesh_allocate_nothing() {
+    use parops::{Lambda, Mesh, MeshKernel};
+    let mesh = Mesh::nodes(&Domain::periodic([0.0; 3], [1.0; 3]).unwrap(), [8; 3]).unwrap();
+    let kernel = Lambda::<4, 2>::new().unwrap();
+    let particles = Particles::jittered([0.0; 3], [1.0; 3], [9; 3], 0.3, 1).unwrap();
+    let stencils = || {
+        for x in particles.points() {
+            std::hint::black_box(mesh.stencil(&kernel, x).unwrap().nodes().count());
+        }
+        std::hint::black_box(MeshKernel::<f32, 6>::weights(&kernel, 0.25));
+    };
+    assert_eq!(allocations(stencils), 0);
+    // The pool allocates, and the lists of several threads.
+    #[cfg(not(feature = "rayon"))]
+    {
+        let (strengths, mut values, mut out) = (vec![1.0; 729], vec![0.0; 512], vec![0.0; 729]);
+        assert_eq!(allocations(|| mesh.deposit(&kernel, particles.points(), &strengths, &mut values).unwrap()), 0);
+        assert_eq!(allocations(|| mesh.gather(&kernel, particles.points(), &values, &mut out).unwrap()), 0);
+    }
+}

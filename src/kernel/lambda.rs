@@ -35,8 +35,8 @@ use crate::scalar::Scalar;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lambda<const P: usize, const R: usize> {
     pieces: Vec<Vec<Rational>>,
-    /// The coefficients of u^n in w_k(u), n = 0..2R+2 outside, k = 0..P+2 inside: the nodes are the lanes of one Horner
-    /// scheme.
+    /// Piece j is E_j(u^2) + u O_j(u^2), node REACH - 1 - j sees it at u and node REACH + j at -u. Row n holds the
+    /// coefficients of u^2n, those of all E_j and then of all O_j: the lanes of one Horner scheme in u^2.
     powers: Vec<f64>,
 }
 
@@ -52,7 +52,7 @@ impl<const P: usize, const R: usize> Lambda<P, R> {
     /// fit 128-bit rationals.
     pub fn new() -> Result<Self> {
         let (exactness, regularity) = (P as u64, R as u64);
-        if P % 2 != 0 || P == 0 || P / 2 > R {
+        if !P.is_multiple_of(2) || P == 0 || P / 2 > R {
             return Err(KernelError::Lambda { exactness, regularity }.into());
         }
         let overflow = || KernelError::LambdaOverflow { exactness, regularity };
@@ -61,19 +61,21 @@ impl<const P: usize, const R: usize> Lambda<P, R> {
             return Err(overflow().into());
         }
         let pieces = pieces(P, R).ok_or_else(overflow)?;
-        let mut powers = vec![0.0; (2 * R + 2) * Self::NODES];
+        let mut powers = vec![0.0; (R + 1) * Self::NODES];
         for (j, piece) in pieces.iter().enumerate() {
-            // Node REACH - 1 - j sees piece j at t = u + 1/2, node REACH + j its mirror image.
             for (n, coefficient) in centered(piece).ok_or_else(overflow)?.into_iter().enumerate() {
-                let (coefficient, row) = (coefficient.to_f64(), n * Self::NODES);
-                powers[row + Self::REACH - 1 - j] = coefficient;
-                powers[row + Self::REACH + j] = if n % 2 == 0 { coefficient } else { -coefficient };
+                powers[Self::place(n, j)] = coefficient.to_f64();
             }
         }
         Ok(Self { pieces, powers })
     }
 
     const HOPELESS: usize = 64;
+
+    /// Where the coefficient of u^n of piece j is kept.
+    const fn place(n: usize, j: usize) -> usize {
+        n / 2 * Self::NODES + n % 2 * Self::REACH + j
+    }
 
     /// The exact coefficients of t^0 to t^(2R+1) on j <= s <= j + 1, t = s - j; `None` beyond the support.
     pub fn piece(&self, j: usize) -> Option<&[Rational]> {
@@ -105,7 +107,7 @@ impl<const P: usize, const R: usize> Lambda<P, R> {
         let mut sum = T::zero();
         for n in (degree..2 * R + 2).rev() {
             let factor = (n - degree + 1..=n).fold(1.0, |product, i| product * i as f64);
-            let coefficient = self.powers.get(n * Self::NODES + Self::REACH - 1 - j).copied().unwrap_or_default();
+            let coefficient = self.powers.get(Self::place(n, j)).copied().unwrap_or_default();
             sum = sum * u + T::lift(factor * coefficient);
         }
         if degree % 2 == 1 && s < T::zero() { -sum } else { sum }
@@ -113,13 +115,15 @@ impl<const P: usize, const R: usize> Lambda<P, R> {
 
     #[inline(always)]
     fn horner<T: Scalar, const S: usize>(&self, u: T) -> [T; S] {
-        let mut weights = [T::zero(); S];
-        for row in self.powers.as_chunks::<S>().0.iter().take(2 * R + 2).rev() {
-            for (weight, &coefficient) in weights.iter_mut().zip(row) {
-                *weight = *weight * u + T::lift(coefficient);
+        let (square, mut sums) = (u * u, [T::zero(); S]);
+        for row in self.powers.as_chunks::<S>().0.iter().take(R + 1).rev() {
+            for (sum, &coefficient) in sums.iter_mut().zip(row) {
+                *sum = *sum * square + T::lift(coefficient);
             }
         }
-        weights
+        std::array::from_fn(|k| {
+            if k < S / 2 { sums[S / 2 - 1 - k] + u * sums[S - 1 - k] } else { sums[k - S / 2] - u * sums[k] }
+        })
     }
 }
 

@@ -108,11 +108,21 @@ impl Axis {
         if self.periodic || self.covers::<S>(self.locate::<S>(x).0) {
             return Ok(());
         }
-        let limit = |first: f64| {
-            self.lower + self.spacing * (first + Self::below::<S>() as f64 - (Self::middle::<S>() - self.start))
-        };
-        let (low, high) = (limit(0.0), limit(self.count as f64 - S as f64 + 1.0));
+        let [low, high] = self.limits::<S>(0.0);
         Err(MeshError::Support { axis, coordinate: x, low, high }.into())
+    }
+
+    /// The coordinates between which the S values are on a bounded mesh, `inside` spacings away from them.
+    fn limits<const S: usize>(&self, inside: f64) -> [f64; 2] {
+        let shift = Self::below::<S>() as f64 - (Self::middle::<S>() - self.start);
+        let ends = [inside, self.count as f64 - S as f64 + 1.0 - inside];
+        ends.map(|first| self.lower + self.spacing * (first + shift))
+    }
+
+    /// Coordinates that surely pass [`check`](Self::check), so that most need no division there.
+    pub(super) fn surely_legal<const S: usize>(&self) -> [f64; 2] {
+        let limits = if self.periodic { [self.lower, self.upper] } else { self.limits::<S>(0.001 + self.round_off) };
+        limits.map(|x| x.clamp(-COORDINATE_HIGH, COORDINATE_HIGH))
     }
 
     /// The S values from `first` on, wrapped, times the stride.

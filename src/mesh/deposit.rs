@@ -1,6 +1,6 @@
 //! Particles to mesh.
 
-use super::{Mesh, MeshStencil};
+use super::{Mesh, MeshStencil, check_values, not_finite};
 use crate::apply::Field;
 use crate::error::{ApplyError, Error, ParticleError, Result};
 use crate::kernel::MeshKernel;
@@ -29,7 +29,8 @@ impl<const D: usize> Mesh<D> {
     /// [`ParticleError::Length`] where there is not one strength per particle,
     /// [`MeshError::Length`](crate::MeshError::Length) where `out` does not fit the mesh, and as
     /// [`stencil`](Self::stencil) and [`ApplyError::FieldOf`], naming the first particle whose support leaves the mesh
-    /// or whose strength is not finite. Nothing is deposited then.
+    /// or whose strength is not finite; nothing is deposited then. [`MeshError::Value`](crate::MeshError::Value) naming
+    /// the first value that is not finite afterwards, by overflow or because it was not before.
     ///
     /// Source: notes 001, eq. 7.19 and 7.20.
     pub fn deposit<T: Field, const S: usize>(
@@ -64,6 +65,18 @@ impl<const D: usize> Mesh<D> {
         self.check_points::<S>(&points[..before])?;
         strengths_checked?;
 
+        self.add(kernel, points, strengths, out)?;
+        check_values(out)
+    }
+
+    /// What remains where every particle is legal.
+    fn add<T: Field, const S: usize, const F: usize>(
+        &self,
+        kernel: &(impl MeshKernel<f64, S> + ?Sized),
+        points: &[[f64; D]],
+        strengths: &[[T; F]],
+        out: &mut [[T; F]],
+    ) -> Result<()> {
         #[cfg(feature = "rayon")]
         if let Some(slabs) = super::slabs::Slabs::new(self, self.strides()[0], S) {
             return slabs.each(
@@ -84,12 +97,8 @@ impl<const D: usize> Mesh<D> {
 }
 
 fn check_strengths<T: Field, const F: usize>(strengths: &[[T; F]]) -> Result<()> {
-    for (p, strengths) in strengths.iter().enumerate() {
-        if let Some((field, value)) = strengths.iter().enumerate().find(|(_, value)| !value.is_finite()) {
-            return Err(Error::from(ApplyError::FieldOf { field, value: value.as_() }).at(p));
-        }
-    }
-    Ok(())
+    not_finite(strengths)
+        .map_or(Ok(()), |(p, field, value)| Err(Error::from(ApplyError::FieldOf { field, value }).at(p)))
 }
 
 /// Adds one particle to the values from `first` on; what lies before or behind them is left to others.

@@ -1,9 +1,9 @@
 //! Mesh to particles.
 
-use super::{Mesh, MeshStencil};
+use super::{Mesh, MeshStencil, check_values, not_finite};
 use crate::apply::Field;
 use crate::apply::blocks::each_row;
-use crate::error::{MeshError, ParticleError, Result};
+use crate::error::{ApplyError, Error, ParticleError, Result};
 use crate::kernel::MeshKernel;
 use crate::scale::Volumes;
 
@@ -25,9 +25,10 @@ impl<const D: usize> Mesh<D> {
     /// ```
     ///
     /// # Errors
-    /// [`MeshError::Length`] where `values` does not fit the mesh, [`ParticleError::Length`] where there is not one
-    /// place in `out` per point, [`MeshError::Value`] naming the first value that is not finite, and as
-    /// [`stencil`](Self::stencil), naming the first point. `out` is then as it was.
+    /// [`MeshError::Length`](crate::MeshError::Length) where `values` does not fit the mesh, [`ParticleError::Length`]
+    /// where there is not one place in `out` per point, [`MeshError::Value`](crate::MeshError::Value) naming the first
+    /// value that is not finite, and as [`stencil`](Self::stencil), naming the first point; `out` is then as it was.
+    /// [`ApplyError::OverflowOf`] naming the first point whose result is not finite.
     ///
     /// Source: notes 001, sec. 7.4.1, with errata 42.
     pub fn gather<T: Field, const S: usize>(
@@ -54,7 +55,7 @@ impl<const D: usize> Mesh<D> {
     ) -> Result<()> {
         self.check_gather::<T, S, F>(points, values, out)?;
         each_row(out, |p| sum(&self.place(kernel, &points[p]), values));
-        Ok(())
+        check_results(out)
     }
 
     /// Interpolates strengths from the mesh to particles: omega_p = V_p u_p, where u_p is gathered from the density
@@ -101,7 +102,7 @@ impl<const D: usize> Mesh<D> {
             let ratio = T::lift(volumes.get(p).unwrap_or_default() / cell);
             sum(&self.place(kernel, &points[p]), strengths).map(|strength| strength * ratio)
         });
-        Ok(())
+        check_results(out)
     }
 
     fn check_gather<T: Field, const S: usize, const F: usize>(
@@ -119,14 +120,9 @@ impl<const D: usize> Mesh<D> {
     }
 }
 
-/// Refuses the first value on the mesh that is not finite.
-pub(super) fn check_values<T: Field, const F: usize>(values: &[[T; F]]) -> Result<()> {
-    for (node, values) in values.iter().enumerate() {
-        if let Some((field, value)) = values.iter().enumerate().find(|(_, value)| !value.is_finite()) {
-            return Err(MeshError::Value { node, field, value: value.as_() }.into());
-        }
-    }
-    Ok(())
+/// Refuses results that overflow, which finite values do only near the largest number there is.
+fn check_results<T: Field, const F: usize>(out: &[[T; F]]) -> Result<()> {
+    not_finite(out).map_or(Ok(()), |(p, field, value)| Err(Error::from(ApplyError::OverflowOf { field, value }).at(p)))
 }
 
 /// sum_k w_k sum_lines weight u: the nodes of a line are summed side by side over the lines first.

@@ -13,6 +13,7 @@ pub use stencil::MeshStencil;
 
 use axis::Axis;
 
+use crate::apply::Field;
 use crate::domain::Domain;
 use crate::error::{MeshError, Result};
 
@@ -164,4 +165,22 @@ impl<const D: usize> Mesh<D> {
         let needed = self.len();
         if found == needed { Ok(()) } else { Err(MeshError::Length { found, needed }.into()) }
     }
+}
+
+/// The first entry, and there the first field, that is not finite.
+fn not_finite<T: Field, const F: usize>(entries: &[[T; F]]) -> Option<(usize, usize, f64)> {
+    const BLOCK: usize = 64;
+    // Many at a time, as long as all are well.
+    let well = |block: &[[T; F]]| block.as_flattened().iter().fold(true, |all, x| all & x.is_finite());
+    let first = BLOCK * entries.chunks(BLOCK).position(|block| !well(block))?;
+    let bad = |(i, entry): (usize, &[T; F])| {
+        let field = entry.iter().position(|x| !x.is_finite())?;
+        Some((i, field, entry[field].as_()))
+    };
+    entries.iter().enumerate().skip(first).find_map(bad)
+}
+
+/// Refuses the first value on the mesh that is not finite.
+fn check_values<T: Field, const F: usize>(values: &[[T; F]]) -> Result<()> {
+    not_finite(values).map_or(Ok(()), |(node, field, value)| Err(MeshError::Value { node, field, value }.into()))
 }

@@ -1,7 +1,6 @@
 //! Mesh to new particles.
 
-use super::Mesh;
-use super::gather::check_values;
+use super::{Mesh, check_values};
 use crate::apply::Field;
 use crate::error::{MeshError, Result};
 use crate::particles::{PARTICLES_HIGH, Particles, check_count, reserved};

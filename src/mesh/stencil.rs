@@ -50,9 +50,14 @@ impl<const D: usize> Mesh<D> {
 
     /// Refuses the first particle that [`stencil`](Self::stencil) would refuse.
     pub(super) fn check_points<const S: usize>(&self, points: &[[f64; D]]) -> Result<()> {
+        let legal = self.axes.map(|axis| axis.surely_legal::<S>());
         let block = |(b, points): (usize, &[[f64; D]])| {
-            let check = |(p, x)| self.check_point::<S>(x).map_err(|error| error.at(b * BLOCK + p));
-            points.iter().enumerate().try_for_each(check)
+            for (p, x) in points.iter().enumerate() {
+                if !x.iter().zip(&legal).all(|(x, [low, high])| low <= x && x <= high) {
+                    self.check_point::<S>(x).map_err(|error| error.at(b * BLOCK + p))?;
+                }
+            }
+            Ok(())
         };
         #[cfg(feature = "rayon")]
         {
