@@ -138,7 +138,7 @@ fn rows_bound_the_eigenvalues_by_gershgorin_where_the_sum_of_the_kernel_does_not
     let pse = Pse::<_, 1>::with_kernels([RationalLaplacian::new()], epsilon, particles.volumes()?)?.support(2.0)?;
     let torus = Domain::periodic([0.0; 3], [1.0; 3])?;
     let row = CellList::build(&particles, &torus, pse.cutoff())?;
-    let report = pse.matrix_free(&row)?.report().clone();
+    let report = *pse.matrix_free(&row)?.report();
     let spectrum = LatticeSpectrum::scan(&RationalLaplacian::new(), 0.25, 2.0)?;
     let fastest = spectrum.lambda_max * 17.0 * 17.0 / 16.0;
     // sum_q V_q eta, q = p included: what errata 26 takes for Gaussians.
