@@ -30,7 +30,8 @@ impl<const D: usize> Mesh<D> {
     /// [`MeshError::Length`](crate::MeshError::Length) where `out` does not fit the mesh, and as
     /// [`stencil`](Self::stencil) and [`ApplyError::FieldOf`], naming the first particle whose support leaves the mesh
     /// or whose strength is not finite; nothing is deposited then. [`MeshError::Value`](crate::MeshError::Value) naming
-    /// the first value that is not finite afterwards, by overflow or because it was not before.
+    /// the first value that is not finite afterwards, by overflow or because it was not before. On several threads also
+    /// [`ParticleError::TooMany`] and [`ParticleError::Memory`] for the lists.
     ///
     /// Source: notes 001, eq. 7.19 and 7.20.
     pub fn deposit<T: Field, const S: usize>(
