@@ -43,7 +43,7 @@ pub struct CubicSpline<const D: usize>(Compact<D>);
 /// Value and derivatives are within a few eps of their absolute terms, which do not cancel at z = 0, at the knots or at
 /// the edge.
 ///
-/// Overlap: up to the limit of 1 a sum over a lattice is 1 to 2e-4. It has 3.4 times the neighbors of [`CubicSpline`]
+/// Overlap: up to the limit of 1 a sum over a lattice is 1 to 3e-4. It has 3.4 times the neighbors of [`CubicSpline`]
 /// in three dimensions. Weakness: from D = 2 on the transform is negative for some waves; in two dimensions pairs form
 /// at epsilon of 1.4 to 1.6 h (measured as for the cubic spline: least gaps of 0.3 and 0.1 h).
 ///
