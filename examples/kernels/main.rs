@@ -8,6 +8,7 @@
 
 mod claim;
 mod exchange;
+#[allow(dead_code, reason = "curves here have no markers but lone circles")]
 #[path = "../figure/mod.rs"]
 mod figure;
 mod lambda;
