@@ -129,8 +129,13 @@ impl BiCgStab {
         let mut left = full;
         self.residual.copy_from_slice(&self.scaled);
         if x.iter().any(|&x| x != 0.0) {
+            product(x, &mut self.work)?;
+            if self.work == b {
+                return Ok(SolveReport::default());
+            }
+            self.residual.iter_mut().zip(&self.work).for_each(|(r, ax)| *r -= scale * ax);
+            left = norm(&self.residual);
             x.iter_mut().for_each(|x| *x *= scale);
-            left = self.true_residual(&product, x)?;
         }
         let mut products = 0;
         while left > 0.0 && (left > goal || products == 0) && products < self.stop.most {
@@ -177,12 +182,12 @@ impl BiCgStab {
         precondition: &impl Fn(&mut [f64]) -> Result<()>,
         x: &mut [f64],
     ) -> Result<bool> {
-        let Self { residual: r, shadow, direction, images: [image, second], work, .. } = self;
+        let Self { stop, residual: r, shadow, direction, images: [image, second], work, .. } = self;
         shadow.copy_from_slice(r);
         direction.copy_from_slice(r);
         let start = norm(r);
         let mut along = dot(shadow, r);
-        while *products < self.stop.most {
+        while *products < stop.most {
             work.copy_from_slice(direction);
             precondition(work)?;
             product(work, image)?;
@@ -193,8 +198,9 @@ impl BiCgStab {
             }
             add(x, alpha, work);
             add(r, -alpha, image);
-            if norm(r) <= goal {
-                return Ok(true);
+            let reached = norm(r) <= goal;
+            if reached || *products == stop.most {
+                return Ok(reached);
             }
 
             work.copy_from_slice(r);

@@ -141,9 +141,12 @@ impl Gmres {
         self.basis.clear();
         self.basis.extend_from_slice(&self.scaled);
         if x.iter().any(|&x| x != 0.0) {
-            x.iter_mut().for_each(|x| *x *= scale);
             product(x, &mut self.work)?;
-            self.basis.iter_mut().zip(&self.work).for_each(|(b, ax)| *b -= ax);
+            if self.work == b {
+                return Ok(SolveReport::default());
+            }
+            self.basis.iter_mut().zip(&self.work).for_each(|(b, ax)| *b -= scale * ax);
+            x.iter_mut().for_each(|x| *x *= scale);
         }
         let (mut left, mut iterations) = (norm(&self.basis), 0);
         while left > 0.0 && (left > goal || iterations == 0) && iterations < self.stop.most {
