@@ -9,7 +9,10 @@ use parops::{
     Rkl2, Sph, SspRk3, Stencil, Stepper,
 };
 #[cfg(not(feature = "rayon"))]
-use parops::{Apply, BoundaryCondition, BoundaryRows, NeighborList, Rows, Strided};
+use parops::{
+    Apply, BiCgStab, BoundaryCondition, BoundaryRows, CsrMatrix, Gmres, Implicit, NeighborList, Rows, SparseSolver,
+    Strided,
+};
 
 struct Counting;
 
@@ -212,4 +215,31 @@ fn imposing_boundary_conditions_allocates_nothing_after_the_first_time() {
     impose(0.0);
     assert_eq!(allocations(|| (0..5).for_each(|n| impose(f64::from(n)))), 0);
     assert_eq!(allocations(|| boundary.replace_values(|_| 0.0, &mut u).unwrap()), 0);
+}
+
+#[cfg(not(feature = "rayon"))]
+#[test]
+fn implicit_steps_after_the_first_allocate_nothing() {
+    let (particles, domain) = particles();
+    let pse = laplacian(&particles);
+    let rows = pse.assemble(&CellList::build(&particles, &domain, pse.cutoff()).unwrap()).unwrap();
+    let solvers: &[fn(CsrMatrix) -> parops::Result<SparseSolver>] = &[
+        |matrix| SparseSolver::bicgstab(matrix, BiCgStab::new()),
+        |matrix| SparseSolver::gmres(matrix, Gmres::new()),
+        #[cfg(feature = "faer")]
+        SparseSolver::lu,
+    ];
+    for &solver in solvers {
+        let mut stepper = Implicit::crank_nicolson(rows.to_csr(0).unwrap()).unwrap().solver(solver);
+        let mut u: Vec<[f32; 2]> = particles.points().iter().map(|x| [x[0] as f32, 1.0]).collect();
+        let mut step = |n: u32| {
+            let source = &mut |t: f64, g: &mut [[f32; 2]]| {
+                g.fill([t as f32, 0.0]);
+                Ok(())
+            };
+            stepper.step(0.1 * f64::from(n), 0.1, &mut u, source).unwrap();
+        };
+        assert!(allocations(|| step(0)) > 0);
+        assert_eq!(allocations(|| (1..6).for_each(&mut step)), 0);
+    }
 }
