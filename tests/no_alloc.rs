@@ -5,8 +5,8 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use parops::{
-    Allowance, CellList, Domain, Epsilon, Euler, Gradient, Laplacian, Leapfrog, Method, Neighbors, Particles, Pse, Rk4,
-    Rkl2, Sph, SspRk3, Stencil, Stepper,
+    Allowance, CellList, D2, DivTensorGrad, Domain, Epsilon, Euler, Gradient, Hessian, Laplacian, Leapfrog, Method,
+    Neighbors, OneSided, Particles, Pse, Rk4, Rkl2, Side, Sph, SspRk3, Stencil, Stepper, Upwind,
 };
 #[cfg(not(feature = "rayon"))]
 use parops::{
@@ -116,15 +116,36 @@ fn weights_into_given_scratch_allocate_nothing_once_a_row_of_that_size_was_made(
     // Rows that the first solver does not certify go through the others: one of those was made by then too.
     let dcpse = parops::DcPse::<Gradient<2>, 2>::new();
     assert_eq!(rows, count_weights(&dcpse, &neighbors));
+
+    let (epsilon, volumes) = (Epsilon::global(2.0 / 30.0).unwrap(), particles.volumes().unwrap());
+    let upwind = Upwind::new(vec![[1.0, -1.0]; 900], epsilon.clone(), volumes).unwrap().support(3.0).unwrap();
+    assert_eq!(rows, count_weights(&upwind, &neighbors));
+    let closure = OneSided::new(D2::<2, 0>::default(), Side::Left, 2, epsilon.clone(), volumes).unwrap();
+    // The longest half-stencil need not be that of the longest row: here every row is made before one is counted.
+    assert_eq!(rows, count_weights_after(0..rows, &closure.support(3.0).unwrap(), &neighbors));
+    let hessian = Pse::anisotropic(Hessian::<2>, epsilon, volumes).unwrap().support(3.0).unwrap();
+    let tensors = vec![[[2.0, 0.5], [0.5, 1.0]]; 900];
+    let tensor = DivTensorGrad::new(hessian.allow(Allowance::Everywhere), &tensors).unwrap();
+    assert_eq!(rows, count_weights(&tensor, &neighbors));
 }
 
 /// Makes the longest row, then all of them, and returns how many were made without an allocation: all.
 fn count_weights<M: Method<2>>(method: &M, neighbors: &CellList<2>) -> usize {
+    let longest = (0..neighbors.targets()).max_by_key(|&p| neighbors.count(p, neighbors.reach())).unwrap();
+    count_weights_after([longest], method, neighbors)
+}
+
+/// Makes the rows `first`, then all of them, and returns how many were made without an allocation: all.
+fn count_weights_after<M: Method<2>>(
+    first: impl IntoIterator<Item = usize>,
+    method: &M,
+    neighbors: &CellList<2>,
+) -> usize {
     let cutoff = neighbors.reach();
-    let longest = (0..neighbors.targets()).max_by_key(|&p| neighbors.count(p, cutoff)).unwrap();
+    let most = (0..neighbors.targets()).map(|p| neighbors.count(p, cutoff)).max().unwrap();
     let mut row = Stencil::default();
     let mut scratch = method.scratch().unwrap();
-    let mut weights = vec![<M::Out as parops::Outputs>::ZERO; neighbors.count(longest, cutoff)];
+    let mut weights = vec![<M::Out as parops::Outputs>::ZERO; most];
     let mut diagonal = <M::Out as parops::Outputs>::ZERO;
     let mut make = |p: usize| {
         neighbors.gather(p, cutoff, &mut row);
@@ -132,7 +153,7 @@ fn count_weights<M: Method<2>>(method: &M, neighbors: &CellList<2>) -> usize {
         method.weights(&row, &mut scratch, weights, &mut diagonal).unwrap();
         std::hint::black_box(method.report(&row, &scratch, weights, &diagonal).unwrap());
     };
-    make(longest);
+    first.into_iter().for_each(&mut make);
     let count = allocations(|| (0..neighbors.targets()).for_each(&mut make));
     assert_eq!(count, 0);
     neighbors.targets()
@@ -161,6 +182,9 @@ fn applying_stored_rows_allocates_nothing_and_matrix_free_nothing_after_the_firs
     assert_eq!(allocations(|| gradient.apply_dot(&outs, &mut out).unwrap()), 0);
     assert_eq!(allocations(|| gradient.apply_along(&outs, &f, &mut out).unwrap()), 0);
     assert_eq!(allocations(|| gradient.apply_curl(&outs, &mut out).unwrap()), 0);
+    let any = parops::UpwindGradient::new(Epsilon::global(2.0 / 30.0).unwrap(), particles.volumes().unwrap());
+    let any = any.support(3.0).unwrap().assemble(&neighbors).unwrap();
+    assert_eq!(allocations(|| any.apply(&outs, &f, &mut out).unwrap()), 0);
     let mut jacobian = vec![[[0.0; 2]; 2]; n];
     assert_eq!(allocations(|| gradient.apply_jacobian(&outs, &mut jacobian).unwrap()), 0);
     let (fields, mut results) = (vec![[1.0; 5]; n], vec![[0.0; 5]; n]);
@@ -178,6 +202,33 @@ fn applying_stored_rows_allocates_nothing_and_matrix_free_nothing_after_the_firs
         assert_eq!(allocations(|| operator.apply(&f, &mut out).unwrap()), 0);
     }
     assert_eq!(allocations(|| cells.apply(&f32s, &mut short).unwrap()), 0);
+}
+
+#[cfg(not(feature = "rayon"))]
+#[test]
+fn sums_over_pairs_allocate_nothing_and_symmetric_pse_nothing_after_the_first_time() {
+    let (particles, domain) = particles();
+    let (n, pse) = (particles.len(), laplacian(&particles));
+    let cells = CellList::build(&particles, &domain, pse.cutoff()).unwrap();
+    let half = pse.symmetric(&cells).unwrap();
+    let (f, mut out) = (vec![1.0; n], vec![0.0; n]);
+    half.apply(&f, &mut out).unwrap();
+    assert_eq!(allocations(|| half.apply(&f, &mut out).unwrap()), 0);
+    let mut sums = vec![[0.0; 2]; n];
+    let symmetry = [parops::Symmetry::Conserved; 2];
+    assert_eq!(allocations(|| half.pairs().accumulate(symmetry, &mut sums, |pair| pair.separation).unwrap()), 0);
+}
+
+#[test]
+fn updates_that_reuse_the_rows_of_a_verlet_list_allocate_nothing() {
+    let (particles, domain) = particles();
+    let mut list = parops::VerletList::build(&particles, &domain, parops::Cutoff(0.1), 0.05).unwrap();
+    for by in [0.01, -0.015, 0.0] {
+        let mut moved = particles.clone();
+        moved.set_points(&particles.points().iter().map(|x| x.map(|x| x + by)).collect::<Vec<_>>()).unwrap();
+        assert_eq!(allocations(|| assert_eq!(list.update(&moved), Ok(false))), 0);
+        assert_eq!(allocations(|| assert!((0..particles.len()).all(|p| list.count(p, 0.1) > 10))), 0);
+    }
 }
 
 #[cfg(not(feature = "rayon"))]
@@ -241,5 +292,27 @@ fn implicit_steps_after_the_first_allocate_nothing() {
         };
         assert!(allocations(|| step(0)) > 0);
         assert_eq!(allocations(|| (1..6).for_each(&mut step)), 0);
+    }
+}
+
+#[test]
+fn transfers_between_particles_and_mesh_allocate_nothing() {
+    use parops::{Lambda, Mesh, MeshKernel};
+    let mesh = Mesh::nodes(&Domain::periodic([0.0; 3], [1.0; 3]).unwrap(), [8; 3]).unwrap();
+    let kernel = Lambda::<4, 2>::new().unwrap();
+    let particles = Particles::jittered([0.0; 3], [1.0; 3], [9; 3], 0.3, 1).unwrap();
+    let stencils = || {
+        for x in particles.points() {
+            std::hint::black_box(mesh.stencil(&kernel, x).unwrap().nodes().count());
+        }
+        std::hint::black_box(MeshKernel::<f32, 6>::weights(&kernel, 0.25));
+    };
+    assert_eq!(allocations(stencils), 0);
+    // The pool allocates, and the lists of several threads.
+    #[cfg(not(feature = "rayon"))]
+    {
+        let (strengths, mut values, mut out) = (vec![1.0; 729], vec![0.0; 512], vec![0.0; 729]);
+        assert_eq!(allocations(|| mesh.deposit(&kernel, particles.points(), &strengths, &mut values).unwrap()), 0);
+        assert_eq!(allocations(|| mesh.gather(&kernel, particles.points(), &values, &mut out).unwrap()), 0);
     }
 }

@@ -14,6 +14,8 @@ mod saved;
 mod splice;
 mod strided;
 mod sweep;
+mod symmetric;
+mod upwind;
 mod vector;
 mod worker;
 
@@ -23,6 +25,8 @@ pub use matrix_free::MatrixFree;
 pub use report::Report;
 pub use rows::{Row, Rows};
 pub use strided::Strided;
+pub use symmetric::SymmetricPse;
+pub use upwind::UpwindRows;
 pub use vector::Vector;
 
 use num_traits::AsPrimitive;

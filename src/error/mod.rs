@@ -5,6 +5,7 @@ mod boundary;
 mod domain;
 mod kernel;
 mod linear;
+mod mesh;
 mod multi_index;
 mod neighbor;
 mod operator;
@@ -16,6 +17,7 @@ pub use boundary::BoundaryError;
 pub use domain::DomainError;
 pub use kernel::KernelError;
 pub use linear::LinearError;
+pub use mesh::MeshError;
 pub use multi_index::MultiIndexError;
 pub use neighbor::NeighborError;
 pub use operator::OperatorError;
@@ -125,6 +127,7 @@ impl fmt::Display for ErrorKind {
             ErrorKind::Neighbor(kind) => kind.fmt(f),
             ErrorKind::Operator(kind) => kind.fmt(f),
             ErrorKind::Apply(kind) => kind.fmt(f),
+            ErrorKind::Mesh(kind) => kind.fmt(f),
             ErrorKind::Linear(kind) => kind.fmt(f),
             ErrorKind::Boundary(kind) => kind.fmt(f),
             ErrorKind::Time(kind) => kind.fmt(f),
@@ -153,6 +156,8 @@ pub enum ErrorKind {
     Operator(OperatorError),
     /// Applying rows to fields.
     Apply(ApplyError),
+    /// Meshes, and what goes between them and particles.
+    Mesh(MeshError),
     /// Sparse matrices and linear solves.
     Linear(LinearError),
     /// Boundary conditions.
@@ -189,6 +194,7 @@ from_kind! {
     Neighbor: NeighborError,
     Operator: OperatorError,
     Apply: ApplyError,
+    Mesh: MeshError,
     Linear: LinearError,
     Boundary: BoundaryError,
     Time: TimeError,
