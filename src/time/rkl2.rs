@@ -96,8 +96,8 @@ impl<S> Rkl2<S> {
         Ok(Self { stages, substeps: 1, start: None, work })
     }
 
-    /// The fewest evaluations with which a step of `dt` keeps `limit`: one substep, of the fewest stages, for symmetric
-    /// rows; as many substeps of at most 40 stages as it takes for others.
+    /// The fewest substeps, and then the fewest stages, with which a step of `dt` keeps `limit`: stages of any number for
+    /// symmetric rows, at most 40 for others. The interval counted on is (s^2 + s - 2)/2 for odd s too.
     ///
     /// The decay rate of `limit` must be a bound on |lambda|, that of the row sums where the rows are not symmetric.
     ///
