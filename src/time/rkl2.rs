@@ -263,8 +263,9 @@ impl<S: State> Work<S> {
             let nu = (1.0 - x) / x * b(j) / b(j - 2);
             let next = nu * c[0];
             older.add_scaled(mu * c[1] / next, newer);
-            older.add_scaled(mu * w * h / next, rate);
+            // Of opposite signs, and the larger one last, so that less overflows on the way.
             older.add_scaled((b(j - 1) - 1.0) * mu * w * h / next, first);
+            older.add_scaled(mu * w * h / next, rate);
             stage.set_sum(u, next, older);
             c = [c[1], next];
             std::mem::swap(&mut older, &mut newer);
