@@ -48,6 +48,7 @@ mod operator;
 mod particles;
 mod scalar;
 mod scale;
+mod solver;
 mod stencil;
 mod time;
 
@@ -73,6 +74,7 @@ pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};
 pub use scalar::Scalar;
 pub use scale::{Cutoff, Epsilon, Spacing, Volumes};
+pub use solver::*;
 pub use stencil::{Neighbor, Stencil};
 pub use time::*;
 

@@ -16,4 +16,5 @@ mod solver;
 pub use csr::CsrMatrix;
 pub use gmres::{Gmres, SolveReport};
 pub use ilu::Ilu0;
+pub(crate) use matrix_market::Counted;
 pub use solver::SparseSolver;
