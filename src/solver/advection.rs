@@ -5,7 +5,7 @@ use super::divergence::FlowDivergence;
 use super::fields::Fields;
 use super::limits::{Limits, Rate};
 use super::term::{SceneTerm, Site};
-use super::transport::Transport;
+use super::transport::{Transport, TransportRows};
 use crate::apply::Report;
 use crate::error::{Error, Limit, Result, SolverError};
 use crate::neighbors::Neighbors;
@@ -26,8 +26,8 @@ pub struct Advection<V, X, W = ()> {
 pub struct AdvectionRows<R, W> {
     rows: R,
     divergence: W,
-    /// The rates, where the velocity is steady.
-    rate: Option<Rate>,
+    /// The rates of the scheme and of its hyperviscosity, where the velocity is steady.
+    rates: Option<[Rate; 2]>,
 }
 
 impl<V, X, W> Advection<V, X, W> {
@@ -58,23 +58,23 @@ impl<V: Velocity<D>, X: Transport<D>, W: FlowDivergence<D>, const D: usize, E: F
         let points = site.points();
         let flow = |p: usize| self.velocity.at(p, &points[p], 0.0);
         let rows = self.scheme.build(site, flow, self.velocity.steady(), neighbors)?;
-        let mut built = AdvectionRows { rows, divergence: W::Values::default(), rate: None };
+        let mut built = AdvectionRows { rows, divergence: W::Values::default(), rates: None };
         if self.velocity.steady() {
             self.refresh_divergence::<D, E>(&mut built, site, 0.0, true)?;
-            built.rate = Some(self.fastest::<D, E>(&built.rows, site, 0.0)?);
+            built.rates = Some(self.fastest::<D, E>(&built.rows, site, 0.0)?);
         }
         Ok(built)
     }
 
     fn refresh(&self, built: &mut Self::Rows, site: &Site<D>, t: f64, u: &[E]) -> Result<()> {
-        self.scheme.refresh(&mut built.rows, u);
+        built.rows.refresh(u);
         self.refresh_divergence::<D, E>(built, site, t, false)
     }
 
     #[inline(always)]
     fn rate(&self, built: &Self::Rows, p: usize, x: &[f64; D], t: f64, u: &[E], rate: E) -> E {
         let v = self.velocity.at(p, x, t);
-        let rate = rate.plus(-1.0, self.scheme.along(&built.rows, p, &v, u));
+        let rate = rate.plus(-1.0, built.rows.along(p, &v, u));
         match self.divergence.at(&built.divergence, p, x, t) {
             Some(divergence) => rate.plus_product(E::Scalar::lift(-divergence), u[p]),
             None => rate,
@@ -83,13 +83,12 @@ impl<V: Velocity<D>, X: Transport<D>, W: FlowDivergence<D>, const D: usize, E: F
 
     fn limit(&self, built: &mut Self::Rows, site: &Site<D>, t: f64, _: &[E], limits: &mut Limits) -> Result<()> {
         self.refresh_divergence::<D, E>(built, site, t, false)?;
-        limits.add(
-            Limit::Advection,
-            match built.rate {
-                Some(rate) => rate,
-                None => self.fastest::<D, E>(&built.rows, site, t)?,
-            },
-        );
+        let [advection, hyperviscosity] = match built.rates {
+            Some(rates) => rates,
+            None => self.fastest::<D, E>(&built.rows, site, t)?,
+        };
+        limits.add(Limit::Advection, advection);
+        limits.add(Limit::Hyperviscosity, hyperviscosity);
         let mut compression = 0.0_f64;
         if !W::ZERO {
             for (p, x) in site.free() {
@@ -106,14 +105,14 @@ impl<V: Velocity<D>, X: Transport<D>, W: FlowDivergence<D>, const D: usize, E: F
 
     fn entries(&self, built: &Self::Rows, p: usize, x: &[f64; D], t: f64, entry: &mut dyn FnMut(usize, f64)) {
         let v = self.velocity.at(p, x, t);
-        self.scheme.entries(&built.rows, p, &v, &mut |q, w| entry(q, -w));
+        built.rows.entries(p, &v, &mut |q, w| entry(q, -w));
         if let Some(divergence) = self.divergence.at(&built.divergence, p, x, t) {
             entry(p, -divergence);
         }
     }
 
     fn report<'a>(&self, built: &'a Self::Rows) -> Option<&'a Report> {
-        Some(self.scheme.report(&built.rows))
+        Some(built.rows.report())
     }
 
     fn velocity(&self, p: usize, x: &[f64; D], t: f64) -> Option<[f64; D]> {
@@ -139,24 +138,25 @@ impl<V, X, W> Advection<V, X, W> {
         W: FlowDivergence<D>,
     {
         let AdvectionRows { rows, divergence, .. } = built;
-        let of = |p: usize, v: &[[f64; D]]| self.scheme.divergence::<E>(rows, p, v);
+        let of = |p: usize, v: &[[f64; D]]| rows.divergence(p, v);
         self.divergence.refresh(divergence, site, t, &self.velocity, first, of)
     }
 
     /// The largest rates over all free particles.
-    fn fastest<const D: usize, E: Fields>(&self, rows: &X::Rows<E>, site: &Site<D>, t: f64) -> Result<Rate>
+    fn fastest<const D: usize, E: Fields>(&self, rows: &X::Rows<E>, site: &Site<D>, t: f64) -> Result<[Rate; 2]>
     where
         V: Velocity<D>,
         X: Transport<D>,
     {
-        let mut fastest = Rate::default();
+        let [mut advection, mut hyperviscosity] = [Rate::default(); 2];
         for (p, x) in site.free() {
             let v = self.velocity.at(p, x, t);
             if let Some(axis) = v.iter().position(|v| !v.is_finite()) {
                 return Err(Error::from(SolverError::Velocity { axis, value: v[axis], t }).at(p));
             }
-            fastest = fastest.larger(self.scheme.rate(rows, &v));
+            advection = advection.larger(rows.rate(p, &v).map_err(|error| error.at(p))?);
+            hyperviscosity = hyperviscosity.larger(rows.hyperviscosity(p, &v));
         }
-        Ok(fastest)
+        Ok([advection, hyperviscosity])
     }
 }

@@ -47,12 +47,10 @@ impl<const D: usize> Totals<D> {
                 part.negative_mass += strength.min(0.0);
                 part.min = part.min.min(value);
                 part.max = part.max.max(value);
-                for i in 0..D {
+                for (i, (first, second)) in part.first.iter_mut().zip(&mut part.second).enumerate() {
                     let moment = strength * x[i];
-                    part.first[i] += moment;
-                    for j in i..D {
-                        part.second[i][j] += moment * x[j];
-                    }
+                    *first += moment;
+                    second.iter_mut().zip(x).skip(i).for_each(|(second, x)| *second += moment * x);
                 }
             }
             all.merge(&part);

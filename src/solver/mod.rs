@@ -10,6 +10,7 @@
 //! that stay.
 
 mod advection;
+mod central;
 mod coefficient;
 mod diffusion;
 mod divergence;
@@ -25,8 +26,10 @@ mod semi_discrete;
 mod source;
 mod term;
 mod transport;
+mod upwind;
 
 pub use advection::{Advection, AdvectionRows};
+pub use central::{Central, CentralRows};
 pub use coefficient::{Diffusivity, Steady, Velocity};
 pub use diffusion::{Diffusion, DiffusionRows};
 pub use divergence::{ComputedDivergence, DivergenceValues, FlowDivergence, GivenDivergence};
@@ -40,4 +43,5 @@ pub use scene::{AdvectionDiffusion, NoTerms, Scene};
 pub use semi_discrete::SemiDiscrete;
 pub use source::Source;
 pub use term::{SceneTerm, Site};
-pub use transport::{CentralRows, Transport};
+pub use transport::{Transport, TransportRows};
+pub use upwind::OneSidedRows;

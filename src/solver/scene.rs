@@ -57,6 +57,9 @@ impl<const D: usize> AdvectionDiffusion<D> {
     }
 }
 
+/// A scene whose advection knows its divergence.
+type Compressible<const D: usize, E, K, V, X, W, S, B> = AdvectionDiffusion<D, E, (K, Advection<V, X, W>, S, B)>;
+
 fn made<const D: usize, E, T>(terms: T) -> AdvectionDiffusion<D, E, T> {
     AdvectionDiffusion { terms, value: PhantomData }
 }
@@ -103,20 +106,20 @@ impl<const D: usize, E: Fields, K, V, X, S, B> AdvectionDiffusion<D, E, (K, Adve
     pub fn divergence<F: Fn(&[f64; D], f64) -> f64 + Sync>(
         self,
         divergence: F,
-    ) -> AdvectionDiffusion<D, E, (K, Advection<V, X, GivenDivergence<F>>, S, B)> {
+    ) -> Compressible<D, E, K, V, X, GivenDivergence<F>, S, B> {
         self.with_divergence(GivenDivergence(divergence))
     }
 
     /// Adds -u div v, with div v by the central rows of the scheme.
     #[must_use]
-    pub fn computed_divergence(self) -> AdvectionDiffusion<D, E, (K, Advection<V, X, ComputedDivergence>, S, B)> {
+    pub fn computed_divergence(self) -> Compressible<D, E, K, V, X, ComputedDivergence, S, B> {
         self.with_divergence(ComputedDivergence)
     }
 
     fn with_divergence<W: FlowDivergence<D>>(
         self,
         divergence: W,
-    ) -> AdvectionDiffusion<D, E, (K, Advection<V, X, W>, S, B)> {
+    ) -> Compressible<D, E, K, V, X, W, S, B> {
         let (k, Advection { velocity, scheme, .. }, s, b) = self.terms;
         made((k, Advection { velocity, scheme, divergence }, s, b))
     }
