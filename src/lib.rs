@@ -52,12 +52,13 @@ mod solver;
 mod stencil;
 mod time;
 
-pub use apply::{Apply, Field, Histogram, MatrixFree, RawRows, Report, Row, Rows, Strided, Vector};
+pub use apply::{Apply, Field, Histogram, MatrixFree, RawRows, Report, Row, Rows, Strided, UpwindRows, Vector};
 pub use boundary::*;
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
 pub use error::*;
 pub use kernel::{
-    ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Rational, SmoothingKernel, WideGaussian,
+    AnisotropicGaussian, ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, OneSidedGaussian, Rational,
+    SmoothingKernel, WideGaussian,
 };
 pub use linear::*;
 pub use moment::{
@@ -67,15 +68,15 @@ pub use moment::{
 };
 pub use multi_index::*;
 pub use neighbors::{
-    BruteForce, Canonical, CellList, Nearest, NeighborList, Neighbors, epsilon_from_neighbors, mean_neighbor_distance,
-    volumes_from_neighbors,
+    BruteForce, Canonical, CellList, Nearest, NeighborList, Neighbors, Selected, epsilon_from_neighbors,
+    mean_neighbor_distance, volumes_from_neighbors,
 };
 pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};
 pub use scalar::Scalar;
 pub use scale::{Cutoff, Epsilon, Spacing, Volumes};
 pub use solver::*;
-pub use stencil::{Neighbor, Stencil};
+pub use stencil::{Neighbor, Side, Stencil};
 pub use time::*;
 
 #[cfg(feature = "testing")]

@@ -11,6 +11,51 @@ pub struct Neighbor<const D: usize> {
     pub sign: i8,
 }
 
+/// One side of a target along an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Sources with x_q < x_p: upwind of a velocity above zero.
+    Left,
+    /// Sources with x_q > x_p: upwind of a velocity below zero.
+    Right,
+}
+
+impl Side {
+    /// Where a velocity component comes from; `None` for zero.
+    ///
+    /// ```
+    /// use parops::Side;
+    /// assert_eq!([2.0, 0.0, -1.0].map(Side::upwind), [Some(Side::Left), None, Some(Side::Right)]);
+    /// ```
+    pub fn upwind(velocity: f64) -> Option<Self> {
+        if velocity > 0.0 {
+            Some(Self::Left)
+        } else if velocity < 0.0 {
+            Some(Self::Right)
+        } else {
+            None
+        }
+    }
+
+    /// +1 on the left, -1 on the right: the sign of x_p - x_q.
+    #[inline(always)]
+    pub fn sign(self) -> f64 {
+        match self {
+            Self::Left => 1.0,
+            Self::Right => -1.0,
+        }
+    }
+}
+
+impl std::fmt::Display for Side {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Left => "left",
+            Self::Right => "right",
+        })
+    }
+}
+
 /// The neighbors of one target, gathered into flat arrays that are reused from target to target.
 ///
 /// The target's own particle, its center, is not among the neighbors; images of it may be.
@@ -43,6 +88,11 @@ impl<const D: usize> Stencil<D> {
         self.sources.clear();
         self.separations.clear();
         self.signs.clear();
+    }
+
+    /// Names another target for the neighbors it holds.
+    pub(crate) fn rename(&mut self, target: usize) {
+        self.target = target;
     }
 
     /// Adds a neighbor. Providers hold fewer than 2^32 sources, so that an index fits 32 bits.

@@ -5,8 +5,8 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use parops::{
-    Allowance, CellList, Domain, Epsilon, Euler, Gradient, Laplacian, Leapfrog, Method, Neighbors, Particles, Pse, Rk4,
-    Rkl2, Sph, SspRk3, Stencil, Stepper,
+    Allowance, CellList, D2, DivTensorGrad, Domain, Epsilon, Euler, Gradient, Hessian, Laplacian, Leapfrog, Method,
+    Neighbors, OneSided, Particles, Pse, Rk4, Rkl2, Side, Sph, SspRk3, Stencil, Stepper, Upwind,
 };
 #[cfg(not(feature = "rayon"))]
 use parops::{Apply, BoundaryCondition, BoundaryRows, NeighborList, Rows, Strided};
@@ -113,6 +113,16 @@ fn weights_into_given_scratch_allocate_nothing_once_a_row_of_that_size_was_made(
     // Rows that the first solver does not certify go through the others: one of those was made by then too.
     let dcpse = parops::DcPse::<Gradient<2>, 2>::new();
     assert_eq!(rows, count_weights(&dcpse, &neighbors));
+
+    let (epsilon, volumes) = (Epsilon::global(2.0 / 30.0).unwrap(), particles.volumes().unwrap());
+    let upwind = Upwind::new(vec![[1.0, -1.0]; 900], epsilon.clone(), volumes).unwrap().support(3.0).unwrap();
+    assert_eq!(rows, count_weights(&upwind, &neighbors));
+    let closure = OneSided::new(D2::<2, 0>::default(), Side::Left, 2, epsilon.clone(), volumes).unwrap();
+    assert_eq!(rows, count_weights(&closure.support(3.0).unwrap(), &neighbors));
+    let hessian = Pse::anisotropic(Hessian::<2>, epsilon, volumes).unwrap().support(3.0).unwrap();
+    let tensors = vec![[[2.0, 0.5], [0.5, 1.0]]; 900];
+    let tensor = DivTensorGrad::new(hessian.allow(Allowance::Everywhere), &tensors).unwrap();
+    assert_eq!(rows, count_weights(&tensor, &neighbors));
 }
 
 /// Makes the longest row, then all of them, and returns how many were made without an allocation: all.
@@ -158,6 +168,9 @@ fn applying_stored_rows_allocates_nothing_and_matrix_free_nothing_after_the_firs
     assert_eq!(allocations(|| gradient.apply_dot(&outs, &mut out).unwrap()), 0);
     assert_eq!(allocations(|| gradient.apply_along(&outs, &f, &mut out).unwrap()), 0);
     assert_eq!(allocations(|| gradient.apply_curl(&outs, &mut out).unwrap()), 0);
+    let any = parops::UpwindGradient::new(Epsilon::global(2.0 / 30.0).unwrap(), particles.volumes().unwrap());
+    let any = any.support(3.0).unwrap().assemble(&neighbors).unwrap();
+    assert_eq!(allocations(|| any.apply(&outs, &f, &mut out).unwrap()), 0);
     let mut jacobian = vec![[[0.0; 2]; 2]; n];
     assert_eq!(allocations(|| gradient.apply_jacobian(&outs, &mut jacobian).unwrap()), 0);
     let (fields, mut results) = (vec![[1.0; 5]; n], vec![[0.0; 5]; n]);

@@ -3,8 +3,8 @@
 
 use nalgebra::{Complex, DMatrix, SymmetricEigen};
 use parops::{
-    Apply, CellList, Domain, Epsilon, Error, ErrorKind, Euler, Exponential, Laplacian, LatticeSpectrum, Particles, Plan,
-    Pse, Rk4, Rkl2, Rows, SspRk3, StepLimit, Stepper, Symmetry, TimeError, integrate,
+    Apply, CellList, Domain, Epsilon, Error, ErrorKind, Euler, Exponential, Laplacian, LatticeSpectrum, Particles,
+    Plan, Pse, Rk4, Rkl2, Rows, SspRk3, StepLimit, Stepper, Symmetry, TimeError, integrate,
 };
 use proptest::prelude::*;
 

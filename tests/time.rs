@@ -6,8 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use nalgebra::{Complex, DVector, SVector, Vector3};
 use parops::{
     Apply, CellList, Domain, Epsilon, Error, ErrorKind, Euler, Exponential, Laplacian, Leapfrog, ParticleError,
-    Particles, Plan, Policy, Pse, Result, Rk4, Rkl2, SspRk3, State,
-    StepLimit, Stepper, TimeError, integrate,
+    Particles, Plan, Policy, Pse, Result, Rk4, Rkl2, SspRk3, State, StepLimit, Stepper, TimeError, integrate,
 };
 use proptest::prelude::*;
 

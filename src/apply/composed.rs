@@ -3,10 +3,10 @@
 use super::{MatrixFree, Rows};
 use crate::error::Result;
 use crate::neighbors::Neighbors;
-use crate::operator::{Contraction, DivGrad, Method};
+use crate::operator::{Contraction, DivGrad, DivTensorGrad, Hessian, Method, Operator};
 
 macro_rules! composed {
-    ($(impl [$($generics:tt)*] $ty:ty, outputs $k:tt;)*) => { $(
+    ($(impl [$($generics:tt)*] $ty:ty, outputs $k:tt $(, where $bound:ty: $of:path)?;)*) => { $(
         impl<$($generics)*> $ty {
             /// Builds the rows of this operator, with `f64` weights; [`Rows::assemble`] rounds them to another type.
             ///
@@ -15,6 +15,7 @@ macro_rules! composed {
             pub fn assemble<const D: usize, P: Neighbors<D>>(&self, neighbors: &P) -> Result<Rows>
             where
                 M: Method<D, Out = [f64; $k]>,
+                $($bound: $of,)?
             {
                 Rows::assemble(self, neighbors)
             }
@@ -29,6 +30,7 @@ macro_rules! composed {
             ) -> Result<MatrixFree<'a, D, Self, P>>
             where
                 M: Method<D, Out = [f64; $k]>,
+                $($bound: $of,)?
             {
                 MatrixFree::new(self, neighbors)
             }
@@ -39,4 +41,5 @@ macro_rules! composed {
 composed! {
     impl [M] DivGrad<M>, outputs 1;
     impl [M, const K: usize] Contraction<M, K>, outputs K;
+    impl [M, const K: usize] DivTensorGrad<M, K>, outputs K, where Hessian<D>: Operator<D, Out = [f64; K]>;
 }

@@ -15,6 +15,7 @@ mod saved;
 mod splice;
 mod strided;
 mod sweep;
+mod upwind;
 mod vector;
 mod worker;
 
@@ -24,6 +25,7 @@ pub use matrix_free::MatrixFree;
 pub use report::Report;
 pub use rows::{Row, Rows};
 pub use strided::Strided;
+pub use upwind::UpwindRows;
 pub use vector::Vector;
 
 use num_traits::AsPrimitive;

@@ -17,6 +17,27 @@ kinds! {
             /// Order r.
             order: u32,
         } => "the exact kernel of degree {degree} and order {order} does not fit 128-bit rationals, or has too many monomials",
+        /// A derivative that is not along one axis, where only such have a kernel.
+        NotAlongAxis {
+            /// Degree |beta|.
+            degree: u32,
+            /// Number of axes it is taken along.
+            axes: usize,
+        } => "one-sided kernels exist for derivatives along one axis, not for degree {degree} along {axes}",
+        /// A degree and an order for which no one-sided kernel is derived.
+        OneSided {
+            /// Degree beta.
+            degree: u32,
+            /// Order r.
+            order: u32,
+            /// Largest legal beta + r.
+            limit: u32,
+        } => "one-sided kernels have order 1 or more and degree plus order up to {limit}, not {degree} and {order}",
+        /// A term of another degree than two, for an anisotropic second-order operator.
+        NotSecond {
+            /// Degree |beta|.
+            degree: u32,
+        } => "the anisotropic Gaussian serves second derivatives, not degree {degree}",
         /// A derivative of higher degree than the kernel has.
         Regularity {
             /// Degree asked for.

@@ -1,6 +1,7 @@
 //! Why methods are refused.
 
 use super::kinds;
+use crate::stencil::Side;
 
 kinds! {
     /// Refusals of the methods that turn a stencil into weights.
@@ -24,6 +25,20 @@ kinds! {
             /// Number of neighbors of the target.
             neighbors: usize,
         } => "the target is no particle (it has {neighbors} neighbors), so the difference f_q - f_p does not exist",
+        /// No neighbor on the side that a one-sided derivative takes its sources from.
+        EmptySide {
+            /// Axis of the derivative.
+            axis: usize,
+            /// The side without neighbors.
+            side: Side,
+            /// Number of neighbors on the other side and beside the target.
+            neighbors: usize,
+        } => "axis {axis}: none of the {neighbors} neighbors is on the {side}",
+        /// An odd image, for rows that tell the side of a source from the sign of its weight.
+        OddImage {
+            /// The source whose image it is.
+            q: usize,
+        } => "source {q} stands behind an odd mirror: build the rows for the velocities at hand instead",
         /// Weights that are not of the form f_q - f_p, where an operator needs them to be.
         NotDifference {
             /// The factor of f_p on the diagonal.

@@ -41,6 +41,40 @@ kinds! {
             /// The diffusivity.
             diffusivity: f64,
         } => "diffusivity {diffusivity} is negative or not finite",
+        /// A diffusion tensor with an entry that is not finite.
+        TensorEntry {
+            /// Row i.
+            row: usize,
+            /// Column j.
+            column: usize,
+            /// D_ij.
+            entry: f64,
+        } => "the diffusion tensor has the entry D[{row}][{column}] = {entry}",
+        /// A diffusion tensor that is not symmetric.
+        Asymmetric {
+            /// Row i.
+            row: usize,
+            /// Column j.
+            column: usize,
+            /// D_ij.
+            upper: f64,
+            /// D_ji.
+            lower: f64,
+        } => "the diffusion tensor is not symmetric: D[{row}][{column}] = {upper}, D[{column}][{row}] = {lower}",
+        /// A diffusion tensor with a negative eigenvalue.
+        Indefinite {
+            /// The smallest eigenvalue.
+            smallest: f64,
+            /// The largest eigenvalue.
+            largest: f64,
+        } => "the diffusion tensor has the eigenvalue {smallest:e}, beside {largest:e}",
+        /// A velocity component that is not finite.
+        Velocity {
+            /// Axis.
+            axis: usize,
+            /// The component.
+            velocity: f64,
+        } => "axis {axis}: velocity {velocity} is not finite",
         /// A coefficient that is not finite.
         Coefficient {
             /// The output it multiplies.

@@ -1,16 +1,22 @@
 //! Kernels: smoothing W, exchange eta^beta. A kernel is unscaled (epsilon = 1); methods scale it.
 
+mod anisotropic;
 mod derivation;
 mod exchange;
 mod gaussian;
 mod harmonic;
 mod high_order;
+mod one_sided;
 mod polynomial;
 mod rational;
+mod twofold;
 
+pub use anisotropic::AnisotropicGaussian;
 pub use exchange::Exchange;
 pub use gaussian::{Gaussian, WideGaussian};
 pub use high_order::HighOrderGaussian;
+pub use one_sided::OneSidedGaussian;
+pub(crate) use one_sided::along_axis;
 pub use polynomial::ExactPolynomial;
 pub use rational::Rational;
 

@@ -102,10 +102,15 @@ impl<T: Scalar, const D: usize> MomentSystem<T, D> {
 
     /// Fills B for the scaled separations z = (x_p - x_q)/epsilon; `radius` is the cutoff in units of epsilon.
     pub fn fill(&mut self, z: &[[T; D]], window: Window, radius: T) {
+        self.fill_windowed(z, |_, squared| window.root(squared, radius));
+    }
+
+    /// Fills B for the scaled separations z and a window whose square root is `root(q, |z_q|^2)`.
+    pub(crate) fn fill_windowed(&mut self, z: &[[T; D]], root: impl Fn(usize, T) -> T) {
         self.n = z.len();
         let n = self.n;
         self.roots.clear();
-        self.roots.extend(z.iter().map(|z| window.root(square(z), radius)));
+        self.roots.extend(z.iter().enumerate().map(|(q, z)| root(q, square(z))));
         self.columns.clear();
         self.columns.resize(n * self.conditions(), T::zero());
         for j in 0..self.conditions() {

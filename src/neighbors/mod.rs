@@ -12,6 +12,7 @@ mod nearest;
 mod order;
 mod placed;
 mod row_check;
+mod selected;
 mod table;
 
 pub use brute_force::BruteForce;
@@ -20,6 +21,7 @@ pub use cell_list::CellList;
 pub use list::NeighborList;
 pub use measure::{epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors};
 pub use nearest::Nearest;
+pub use selected::Selected;
 
 use crate::error::Result;
 use crate::stencil::{Neighbor, Stencil};

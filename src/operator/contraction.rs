@@ -60,21 +60,16 @@ impl<M, const K: usize> Contraction<M, K> {
         &self.method
     }
 
+    fn lengths(&self, targets: usize, _: usize) -> Result<()> {
+        let found = self.coefficients.len();
+        if found == targets { Ok(()) } else { Err(ParticleError::Length { found, needed: targets }.into()) }
+    }
+
     fn coefficients_of(&self, p: usize) -> Result<&[f64; K]> {
         let found = self.coefficients.len();
         self.coefficients.get(p).ok_or_else(|| OperatorError::Length { found, index: p }.into())
     }
-}
 
-/// Working memory of [`Contraction`]: that of the method, and the rows it makes.
-#[derive(Clone, Debug)]
-pub struct ContractionScratch<S, const D: usize, const K: usize> {
-    method: S,
-    /// The first holds the row of a single target; its stencil is not used.
-    drafts: Vec<Draft<D, [f64; K]>>,
-}
-
-impl<M, const K: usize> Contraction<M, K> {
     /// Contracts a row of the method.
     fn contract<const D: usize>(
         &self,
@@ -89,42 +84,61 @@ impl<M, const K: usize> Contraction<M, K> {
         Ok(())
     }
 
-    /// Has `make` turn the drafts of the method into rows, and contracts those that came out.
-    fn through<const D: usize>(
+    /// What the coefficients change in the report of the method.
+    fn certify<const D: usize>(
         &self,
-        drafts: &mut [Draft<D, [f64; 1]>],
-        whole: &mut Vec<Draft<D, [f64; K]>>,
-        make: impl FnOnce(&mut [Draft<D, [f64; K]>]),
-    ) {
-        if whole.len() < drafts.len() {
-            whole.resize(drafts.len(), Draft::default());
-        }
-        let whole = &mut whole[..drafts.len()];
-        for (draft, whole) in drafts.iter_mut().zip(whole.iter_mut()) {
-            std::mem::swap(&mut draft.stencil, &mut whole.stencil);
-            whole.clear();
-            whole.report = draft.report.clone();
-        }
-        make(whole);
-        for (draft, whole) in drafts.iter_mut().zip(whole) {
-            std::mem::swap(&mut draft.stencil, &mut whole.stencil);
-            draft.clear();
-            let Draft { stencil, weights, diagonal, report } = draft;
-            *report = whole.report.clone();
-            if let Ok(known) = whole.report {
-                *report = self
-                    .contract(stencil, (&whole.weights, &whole.diagonal), weights, diagonal)
-                    .map(|()| certify(stencil, weights, diagonal, known));
-            }
-            if let (true, Err(error)) = (draft.report.is_ok(), draft.finite()) {
-                draft.report = Err(error);
-            }
+        row: &Stencil<D>,
+        w: &[[f64; 1]],
+        diagonal: &[f64; 1],
+        known: RowReport,
+    ) -> Result<RowReport> {
+        Ok(contracted(row, w, diagonal, known))
+    }
+}
+
+/// Working memory of an operator that contracts the rows of another, [`Contraction`] or
+/// [`DivTensorGrad`](super::DivTensorGrad): that of the method, and the rows it makes.
+#[derive(Clone, Debug)]
+pub struct ContractionScratch<S, const D: usize, const K: usize> {
+    pub(super) method: S,
+    /// The first holds the row of a single target; its stencil is not used.
+    pub(super) drafts: Vec<Draft<D, [f64; K]>>,
+}
+
+/// Has `make` turn the drafts of the method into rows, and `contract` those that came out.
+pub(super) fn through<const D: usize, const K: usize>(
+    drafts: &mut [Draft<D, [f64; 1]>],
+    whole: &mut Vec<Draft<D, [f64; K]>>,
+    make: impl FnOnce(&mut [Draft<D, [f64; K]>]),
+    contract: impl Fn(&Draft<D, [f64; K]>, RowReport, &mut Draft<D, [f64; 1]>) -> Result<RowReport>,
+) {
+    if whole.len() < drafts.len() {
+        whole.resize(drafts.len(), Draft::default());
+    }
+    let whole = &mut whole[..drafts.len()];
+    for (draft, whole) in drafts.iter_mut().zip(whole.iter_mut()) {
+        std::mem::swap(&mut draft.stencil, &mut whole.stencil);
+        whole.clear();
+        whole.report = draft.report.clone();
+    }
+    make(whole);
+    for (draft, whole) in drafts.iter_mut().zip(whole) {
+        std::mem::swap(&mut draft.stencil, &mut whole.stencil);
+        draft.clear();
+        draft.report = whole.report.clone().and_then(|known| contract(whole, known, draft));
+        if let (true, Err(error)) = (draft.report.is_ok(), draft.finite()) {
+            draft.report = Err(error);
         }
     }
 }
 
-/// What the coefficients change in the report of the method.
-fn certify<const D: usize>(row: &Stencil<D>, w: &[[f64; 1]], diagonal: &[f64; 1], mut report: RowReport) -> RowReport {
+/// The report of a method after its outputs were contracted to one.
+pub(super) fn contracted<const D: usize>(
+    row: &Stencil<D>,
+    w: &[[f64; 1]],
+    diagonal: &[f64; 1],
+    mut report: RowReport,
+) -> RowReport {
     let general = RowReport::of(row, w, diagonal);
     (report.sum_abs, report.spectral_bound) = (general.sum_abs, general.spectral_bound);
     report.negative_weights = w.iter().zip(row.signs()).filter(|&(w, &sign)| w[0] * f64::from(sign) < 0.0).count();
@@ -132,75 +146,97 @@ fn certify<const D: usize>(row: &Stencil<D>, w: &[[f64; 1]], diagonal: &[f64; 1]
 }
 
 #[inline(always)]
-fn dot<const K: usize>(coefficients: &[f64; K], outputs: &[f64; K]) -> f64 {
+pub(super) fn dot<const K: usize>(coefficients: &[f64; K], outputs: &[f64; K]) -> f64 {
     coefficients.iter().zip(outputs).map(|(c, w)| c * w).sum()
 }
 
-impl<M, const D: usize, const K: usize> Method<D> for Contraction<M, K>
-where
-    M: Method<D, Out = [f64; K]>,
-{
-    type Out = [f64; 1];
-    type Scratch = ContractionScratch<M::Scratch, D, K>;
+/// The [`Method`] of an operator that contracts the K outputs of its field `method` to one, by its own `lengths`,
+/// `contract` and `certify`.
+macro_rules! contracted_method {
+    ($name:ident $(where $($bound:tt)*)?) => {
+        impl<M, const D: usize, const K: usize> Method<D> for $name<M, K>
+        where
+            M: Method<D, Out = [f64; K]>,
+            $($($bound)*)?
+        {
+            type Out = [f64; 1];
+            type Scratch = ContractionScratch<M::Scratch, D, K>;
 
-    fn scratch(&self) -> Result<Self::Scratch> {
-        Ok(ContractionScratch { method: self.method.scratch()?, drafts: vec![Draft::default()] })
-    }
+            fn scratch(&self) -> Result<Self::Scratch> {
+                Ok(ContractionScratch { method: self.method.scratch()?, drafts: vec![Draft::default()] })
+            }
 
-    fn validate(&self, targets: usize, sources: usize) -> Result<()> {
-        let found = self.coefficients.len();
-        if found != targets {
-            return Err(ParticleError::Length { found, needed: targets }.into());
+            fn validate(&self, targets: usize, sources: usize) -> Result<()> {
+                self.lengths(targets, sources)?;
+                self.method.validate(targets, sources)
+            }
+
+            fn cutoff(&self, p: usize) -> Result<Option<f64>> {
+                self.method.cutoff(p)
+            }
+
+            fn weights(
+                &self,
+                row: &Stencil<D>,
+                scratch: &mut Self::Scratch,
+                w: &mut [[f64; 1]],
+                diagonal: &mut [f64; 1],
+            ) -> Result<()> {
+                let Draft { weights: outputs, diagonal: own, .. } = &mut scratch.drafts[0];
+                outputs.clear();
+                outputs.resize(row.len(), [0.0; K]);
+                self.method.weights(row, &mut scratch.method, outputs, own)?;
+                self.contract(row, (outputs, own), w, diagonal)
+            }
+
+            fn report(
+                &self,
+                row: &Stencil<D>,
+                scratch: &Self::Scratch,
+                w: &[[f64; 1]],
+                diagonal: &[f64; 1],
+            ) -> Result<RowReport> {
+                let Draft { weights: outputs, diagonal: own, .. } = &scratch.drafts[0];
+                self.certify(row, w, diagonal, self.method.report(row, &scratch.method, outputs, own)?)
+            }
+
+            fn weights_batch(&self, drafts: &mut [Draft<D, [f64; 1]>], scratch: &mut Self::Scratch) {
+                let ContractionScratch { method, drafts: whole } = scratch;
+                through(
+                    drafts,
+                    whole,
+                    |whole| self.method.weights_batch(whole, method),
+                    |whole, known, Draft { stencil, weights, diagonal, .. }| {
+                        self.contract(stencil, (&whole.weights, &whole.diagonal), weights, diagonal)?;
+                        self.certify(stencil, weights, diagonal, known)
+                    },
+                );
+            }
+
+            fn growths(&self) -> u32 {
+                self.method.growths()
+            }
+
+            fn can_grow(&self, refusal: &Error) -> bool {
+                self.method.can_grow(refusal)
+            }
+
+            fn stand_in(&self, draft: &mut Draft<D, [f64; 1]>, scratch: &mut Self::Scratch) {
+                let ContractionScratch { method, drafts: whole } = scratch;
+                through(
+                    std::slice::from_mut(draft),
+                    whole,
+                    |whole| whole.iter_mut().for_each(|whole| self.method.stand_in(whole, method)),
+                    |whole, known, Draft { stencil, weights, diagonal, .. }| {
+                        self.contract(stencil, (&whole.weights, &whole.diagonal), weights, diagonal)?;
+                        self.certify(stencil, weights, diagonal, known)
+                    },
+                );
+            }
         }
-        self.method.validate(targets, sources)
-    }
-
-    fn cutoff(&self, p: usize) -> Result<Option<f64>> {
-        self.method.cutoff(p)
-    }
-
-    fn weights(
-        &self,
-        row: &Stencil<D>,
-        scratch: &mut Self::Scratch,
-        w: &mut [[f64; 1]],
-        diagonal: &mut [f64; 1],
-    ) -> Result<()> {
-        let Draft { weights: outputs, diagonal: own, .. } = &mut scratch.drafts[0];
-        outputs.clear();
-        outputs.resize(row.len(), [0.0; K]);
-        self.method.weights(row, &mut scratch.method, outputs, own)?;
-        self.contract(row, (outputs, own), w, diagonal)
-    }
-
-    fn report(
-        &self,
-        row: &Stencil<D>,
-        scratch: &Self::Scratch,
-        w: &[[f64; 1]],
-        diagonal: &[f64; 1],
-    ) -> Result<RowReport> {
-        let Draft { weights: outputs, diagonal: own, .. } = &scratch.drafts[0];
-        Ok(certify(row, w, diagonal, self.method.report(row, &scratch.method, outputs, own)?))
-    }
-
-    fn weights_batch(&self, drafts: &mut [Draft<D, [f64; 1]>], scratch: &mut Self::Scratch) {
-        let ContractionScratch { method, drafts: whole } = scratch;
-        self.through(drafts, whole, |whole| self.method.weights_batch(whole, method));
-    }
-
-    fn growths(&self) -> u32 {
-        self.method.growths()
-    }
-
-    fn can_grow(&self, refusal: &Error) -> bool {
-        self.method.can_grow(refusal)
-    }
-
-    fn stand_in(&self, draft: &mut Draft<D, [f64; 1]>, scratch: &mut Self::Scratch) {
-        let ContractionScratch { method, drafts: whole } = scratch;
-        self.through(std::slice::from_mut(draft), whole, |whole| {
-            whole.iter_mut().for_each(|whole| self.method.stand_in(whole, method));
-        });
-    }
+    };
 }
+
+pub(super) use contracted_method;
+
+contracted_method!(Contraction);

@@ -201,7 +201,7 @@ pub(super) fn times(value: f64, factor: f64, count: usize) -> f64 {
     (0..count).fold(value, |product, _| product * factor)
 }
 
-fn positive(value: f64) -> Result<f64> {
+pub(super) fn positive(value: f64) -> Result<f64> {
     if value > 0.0 && value.is_finite() { Ok(value) } else { Err(OperatorError::Setting { value }.into()) }
 }
 

@@ -6,7 +6,7 @@ use super::method::Method;
 use super::pairwise::{PairScratch, Pairing, Pairwise, pairwise_method};
 use super::row_report::RowReport;
 use crate::error::{OperatorError, Result};
-use crate::kernel::{Exchange, Kernel};
+use crate::kernel::{AnisotropicGaussian, Exchange, Kernel};
 use crate::scale::{Cutoff, Epsilon, Volumes};
 use crate::stencil::Stencil;
 
@@ -80,6 +80,25 @@ impl<const D: usize, const N: usize> Pse<Exchange<D>, N> {
         let kernels = terms.iter().map(|terms| Exchange::new(terms, order)).collect::<Result<Vec<_>>>()?;
         let outputs = kernels.len();
         // `collect` hands out one list of terms per output, so the lengths agree.
+        let kernels = kernels.try_into().map_err(|_| OperatorError::Length { found: outputs, index: N })?;
+        Self::with_kernels(kernels, epsilon, volumes)
+    }
+}
+
+impl<const D: usize, const N: usize> Pse<AnisotropicGaussian<D>, N> {
+    /// PSE of order 2 with the kernels 4 pi^(-D/2) (z . m z) exp(-|z|^2) of second derivatives: of `Hessian` for
+    /// [`DivTensorGrad`](super::DivTensorGrad).
+    ///
+    /// # Errors
+    /// As [`AnisotropicGaussian::new`].
+    pub fn anisotropic<Op: Operator<D, Out = [f64; N]>>(
+        operator: Op,
+        epsilon: Epsilon,
+        volumes: &Volumes,
+    ) -> Result<Self> {
+        let terms = collect(&operator)?;
+        let kernels = terms.iter().map(|terms| AnisotropicGaussian::new(terms)).collect::<Result<Vec<_>>>()?;
+        let outputs = kernels.len();
         let kernels = kernels.try_into().map_err(|_| OperatorError::Length { found: outputs, index: N })?;
         Self::with_kernels(kernels, epsilon, volumes)
     }

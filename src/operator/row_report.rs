@@ -53,8 +53,8 @@ pub struct RowReport {
     /// The bound this row sets on the modulus of the eigenvalues of the operator, in units of the operator.
     #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub spectral_bound: f64,
-    /// Largest over smallest diffusivity of the stencil, see [`DivGrad`](crate::DivGrad); 1 where there is none, infinite
-    /// beside an insulator.
+    /// Largest over smallest diffusivity of the stencil, see [`DivGrad`](crate::DivGrad), or trace of the diffusion tensor,
+    /// see [`DivTensorGrad`](crate::DivTensorGrad); 1 where there is none, infinite beside an insulator.
     #[cfg_attr(feature = "serde", serde(with = "crate::scalar::figure"))]
     pub contrast: f64,
     /// Whether modes may grow: [`Mean::Arithmetic`](crate::Mean) across a contrast above 10, at an order above 2 and with

@@ -10,7 +10,7 @@ use super::semi_discrete::SemiDiscrete;
 use crate::error::{Limit, Result, SolverError, TimeError};
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
-use crate::time::{Euler, Leapfrog, Plan, Rk4, Stepper};
+use crate::time::{Euler, Leapfrog, Plan, Rk4, SspRk3, Stepper};
 
 /// How many right-hand sides a scheme evaluates a step.
 pub trait Stages {
@@ -24,6 +24,10 @@ impl<S> Stages for Euler<S> {
 
 impl<S> Stages for Leapfrog<S> {
     const STAGES: usize = 1;
+}
+
+impl<S> Stages for SspRk3<S> {
+    const STAGES: usize = 3;
 }
 
 impl<S> Stages for Rk4<S> {

@@ -116,10 +116,7 @@ impl<const D: usize, E: Fields, K, V, X, S, B> AdvectionDiffusion<D, E, (K, Adve
         self.with_divergence(ComputedDivergence)
     }
 
-    fn with_divergence<W: FlowDivergence<D>>(
-        self,
-        divergence: W,
-    ) -> Compressible<D, E, K, V, X, W, S, B> {
+    fn with_divergence<W: FlowDivergence<D>>(self, divergence: W) -> Compressible<D, E, K, V, X, W, S, B> {
         let (k, Advection { velocity, scheme, .. }, s, b) = self.terms;
         made((k, Advection { velocity, scheme, divergence }, s, b))
     }

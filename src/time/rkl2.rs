@@ -109,8 +109,7 @@ impl<S> Rkl2<S> {
             return Err(TimeError::Step { dt }.into());
         }
         let most = most_stages(symmetry);
-        let reaches =
-            |stages: u32, substeps: u32| dt <= limit.step_of_interval(f64::from(substeps) * interval(stages));
+        let reaches = |stages: u32, substeps: u32| dt <= limit.step_of_interval(f64::from(substeps) * interval(stages));
         if !reaches(most, u32::MAX) {
             let limit = limit.step_of_interval(f64::from(u32::MAX) * interval(most));
             return Err(TimeError::Limit { dt, limit }.into());
@@ -240,15 +239,7 @@ impl<S: State> Stepper<S> for Rkl2<S> {
 
 impl<S: State> Work<S> {
     /// The state a substep of length h from `u` leads to; its stages are counted on from `before`.
-    fn substep(
-        &mut self,
-        s: u32,
-        before: usize,
-        t: f64,
-        h: f64,
-        u: &S,
-        rhs: &mut Rhs<'_, S>,
-    ) -> Result<&mut S> {
+    fn substep(&mut self, s: u32, before: usize, t: f64, h: f64, u: &S, rhs: &mut Rhs<'_, S>) -> Result<&mut S> {
         let (first, rate, stage) =
             (scratch(&mut self.first, u), scratch(&mut self.rate, u), scratch(&mut self.stage, u));
         let [even, odd] = &mut self.moved;
