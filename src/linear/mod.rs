@@ -1,5 +1,6 @@
 //! Sparse matrices made of rows, and the linear systems they pose.
 
+mod bicgstab;
 mod condition;
 mod csr;
 mod export;
@@ -10,11 +11,16 @@ mod ilu;
 #[cfg(feature = "faer")]
 mod lu;
 mod matrix_market;
+mod norm;
 mod replace;
+mod shifted;
 mod solver;
+mod stop;
 
+pub use bicgstab::BiCgStab;
 pub use csr::CsrMatrix;
-pub use gmres::{Gmres, SolveReport};
+pub use gmres::Gmres;
 pub use ilu::Ilu0;
 pub(crate) use matrix_market::Counted;
 pub use solver::SparseSolver;
+pub use stop::SolveReport;

@@ -119,6 +119,10 @@ impl<V: Velocity<D>, X: Transport<D>, W: FlowDivergence<D>, const D: usize, E: F
         Some(self.velocity.at(p, x, t))
     }
 
+    fn viscosity(&self, p: usize, x: &[f64; D], t: f64) -> f64 {
+        self.scheme.viscosity(p, &self.velocity.at(p, x, t))
+    }
+
     fn steady(&self) -> bool {
         self.velocity.steady()
     }

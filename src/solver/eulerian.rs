@@ -6,35 +6,14 @@ use super::ledger::LedgerRow;
 use super::limits::{Limits, Rate};
 use super::policy::{GrowthPolicy, StepPolicy};
 use super::scene::Scene;
+use super::scheme::TimeScheme;
 use super::semi_discrete::SemiDiscrete;
 use crate::error::{Limit, Result, SolverError, TimeError};
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
-use crate::time::{Euler, Leapfrog, Plan, Rk4, SspRk3, Stepper};
+use crate::time::Plan;
 
-/// How many right-hand sides a scheme evaluates a step.
-pub trait Stages {
-    /// That number.
-    const STAGES: usize;
-}
-
-impl<S> Stages for Euler<S> {
-    const STAGES: usize = 1;
-}
-
-impl<S> Stages for Leapfrog<S> {
-    const STAGES: usize = 1;
-}
-
-impl<S> Stages for SspRk3<S> {
-    const STAGES: usize = 3;
-}
-
-impl<S> Stages for Rk4<S> {
-    const STAGES: usize = 4;
-}
-
-/// A scene on fixed particles, advanced by any stepper.
+/// A scene on fixed particles, advanced by any stepper, or implicitly ([`ImplicitScheme`](crate::ImplicitScheme)).
 ///
 /// Before each step the limits of the moment are computed from the actual rows; a step above them is refused unless
 /// [`step_policy`](Self::step_policy) says otherwise. After an error, and after a panic in a function of the scene, field
@@ -68,7 +47,7 @@ pub struct Eulerian<const D: usize, S: Scene<D>, St> {
     work: Vec<S::Value>,
 }
 
-impl<const D: usize, S: Scene<D>, St: Stepper<Vec<S::Value>>> Eulerian<D, S, St> {
+impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     /// Makes the rows of the scene on these particles; the run starts at t = 0.
     ///
     /// # Errors
@@ -97,8 +76,9 @@ impl<const D: usize, S: Scene<D>, St: Stepper<Vec<S::Value>>> Eulerian<D, S, St>
             ledger.residual = ledger.residual.max(report.residual);
         }
         if steps != StepPolicy::Allow {
-            // A source may not be defined at u = 0; what it makes of the first field shows before the first step.
-            discrete.linear_limits(0.0)?.possible(&stepper)?;
+            // What the source adds shows before the first step: it may not be defined without a field.
+            discrete.linear_limits(0.0)?.possible_within(|limit| stepper.intervals(limit))?;
+            stepper.check_symmetry(discrete.symmetry())?;
         }
         Ok(Self { discrete, stepper, steps, sharp: Vec::new(), ledger, start: Vec::new(), t: 0.0, work: Vec::new() })
     }
@@ -161,7 +141,7 @@ impl<const D: usize, S: Scene<D>, St: Stepper<Vec<S::Value>>> Eulerian<D, S, St>
     ///
     /// # Errors
     /// [`SolverError::Limit`] for a step above the limit, [`SolverError::Substeps`] where cutting it does not help;
-    /// [`TimeError::NotFinite`] with particle, stage and time; as [`Stepper::step`] and [`SemiDiscrete::rate`]. Field and
+    /// [`TimeError::NotFinite`] with particle, stage and time; as [`TimeScheme::step`] and [`SemiDiscrete::rate`]. Field and
     /// run are then as they were.
     pub fn step(&mut self, u: &mut Vec<S::Value>, dt: f64) -> Result<&LedgerRow<D>> {
         self.step_to(u, dt, self.t + dt)
@@ -196,10 +176,10 @@ impl<const D: usize, S: Scene<D>, St: Stepper<Vec<S::Value>>> Eulerian<D, S, St>
 
     fn step_to(&mut self, u: &mut Vec<S::Value>, dt: f64, end: f64) -> Result<&LedgerRow<D>> {
         let limits = self.limits_at(self.t, u)?;
-        let (limit, binding) = (limits.step(&self.stepper), limits.binding(&self.stepper));
+        let (limit, binding) = self.bound(&limits);
         let within = dt <= limit;
         if !within && self.steps == StepPolicy::Refuse {
-            limits.check(dt, &self.stepper)?;
+            return Err(SolverError::Limit { dt, limit, binding: binding.unwrap_or(Limit::Diffusion) }.into());
         }
         if self.start.is_empty() {
             self.ledger.measure(self.discrete.site().particles(), u, &[]);
@@ -208,7 +188,7 @@ impl<const D: usize, S: Scene<D>, St: Stepper<Vec<S::Value>>> Eulerian<D, S, St>
         let whole = within || self.steps == StepPolicy::Allow;
         let substeps = if whole && !<S::Edge as Edge<D, S::Value>>::PRESENT {
             let Self { discrete, stepper, t, .. } = self;
-            stepper.step(*t, dt, u, &mut |t, u, du| discrete.rate(t, u, du))?;
+            stepper.step(*t, dt, u, discrete)?;
             1
         } else {
             let mut work = std::mem::take(&mut self.work);
@@ -233,10 +213,16 @@ impl<const D: usize, S: Scene<D>, St: Stepper<Vec<S::Value>>> Eulerian<D, S, St>
         Ok(&self.ledger)
     }
 
+    /// The longest legal step, and what binds it.
+    fn bound(&self, limits: &Limits) -> (f64, Option<Limit>) {
+        let intervals = |limit| self.stepper.intervals(limit);
+        (limits.step_within(intervals), limits.binding_within(intervals))
+    }
+
     /// One substep of a scene, boundary values included.
     fn substep(&mut self, u: &mut Vec<S::Value>, t: f64, dt: f64) -> Result<()> {
         let Self { discrete, stepper, .. } = self;
-        stepper.step(t, dt, u, &mut |t, u, du| discrete.rate(t, u, du))?;
+        stepper.step(t, dt, u, discrete)?;
         discrete.impose(t + dt, u)
     }
 
@@ -246,10 +232,11 @@ impl<const D: usize, S: Scene<D>, St: Stepper<Vec<S::Value>>> Eulerian<D, S, St>
         let (mut t, end, mut done) = (self.t, self.t + dt, 0);
         loop {
             let rest = end - t;
-            let parts = limits.steps(rest, &self.stepper).max(1.0);
+            let (limit, binding) = self.bound(&limits);
+            let parts = (rest / limit).ceil().max(1.0);
             if !(parts <= f64::from(most - done.min(most))) {
-                let binding = limits.binding(&self.stepper).unwrap_or(Limit::Diffusion);
-                return Err(SolverError::Substeps { dt, limit: limits.step(&self.stepper), binding, most }.into());
+                let binding = binding.unwrap_or(Limit::Diffusion);
+                return Err(SolverError::Substeps { dt, limit, binding, most }.into());
             }
             self.substep(u, t, rest / parts)?;
             done += 1;

@@ -90,14 +90,23 @@ impl Limits {
 
     /// The longest legal step of a stepper: infinite without a limit, 0 where no step is stable.
     pub fn step<S: State>(&self, stepper: &(impl Stepper<S> + ?Sized)) -> f64 {
-        let shares = self.rates.map(|rate| share(rate, stepper));
-        let fixed = self.rates.iter().fold(0.0, |most, rate| rate.frequency.max(most));
-        1.0 / shares.iter().fold(0.0, |sum: f64, share| sum + share).max(fixed)
+        self.step_within(of(stepper))
+    }
+
+    /// The longest legal step where modes of each kind are stable on these intervals (x, y).
+    pub fn step_within(&self, intervals: impl Fn(Limit) -> (f64, f64)) -> f64 {
+        let shares = Limit::ALL.iter().fold(0.0, |sum, &limit| sum + share(self.rate(limit), intervals(limit)));
+        1.0 / self.rates.iter().fold(shares, |most: f64, rate| most.max(rate.frequency))
     }
 
     /// The kind with the largest share in the limit; `None` where nothing binds.
     pub fn binding<S: State>(&self, stepper: &(impl Stepper<S> + ?Sized)) -> Option<Limit> {
-        let weigh = |limit: &Limit| share(self.rate(*limit), stepper).max(self.rate(*limit).frequency);
+        self.binding_within(of(stepper))
+    }
+
+    /// The same where modes of each kind are stable on these intervals (x, y).
+    pub fn binding_within(&self, intervals: impl Fn(Limit) -> (f64, f64)) -> Option<Limit> {
+        let weigh = |limit: &Limit| share(self.rate(*limit), intervals(*limit)).max(self.rate(*limit).frequency);
         let most = Limit::ALL.into_iter().rev().max_by(|a, b| weigh(a).total_cmp(&weigh(b)))?;
         (weigh(&most) > 0.0).then_some(most)
     }
@@ -124,19 +133,29 @@ impl Limits {
     /// # Errors
     /// [`SolverError::Unstable`] naming the term, its rates and the intervals of the stepper.
     pub fn possible<S: State>(&self, stepper: &(impl Stepper<S> + ?Sized)) -> Result<()> {
-        match Limit::ALL.into_iter().find(|&limit| share(self.rate(limit), stepper).is_infinite()) {
-            None => Ok(()),
-            Some(term) => {
-                let Rate { decay, oscillation, .. } = self.rate(term);
-                let (negative_real, imaginary) = (stepper.negative_real_interval(), stepper.imaginary_interval());
-                Err(SolverError::Unstable { term, decay, oscillation, negative_real, imaginary }.into())
-            }
-        }
+        self.possible_within(of(stepper))
+    }
+
+    /// The same where modes of each kind are stable on these intervals (x, y).
+    ///
+    /// # Errors
+    /// As [`possible`](Self::possible).
+    pub fn possible_within(&self, intervals: impl Fn(Limit) -> (f64, f64)) -> Result<()> {
+        let impossible = |&limit: &Limit| share(self.rate(limit), intervals(limit)).is_infinite();
+        let Some(term) = Limit::ALL.into_iter().find(impossible) else { return Ok(()) };
+        let (Rate { decay, oscillation, .. }, (negative_real, imaginary)) = (self.rate(term), intervals(term));
+        Err(SolverError::Unstable { term, decay, oscillation, negative_real, imaginary }.into())
     }
 }
 
+/// The intervals of a stepper, the same for all kinds of modes.
+fn of<S: State>(stepper: &(impl Stepper<S> + ?Sized)) -> impl Fn(Limit) -> (f64, f64) {
+    let intervals = (stepper.negative_real_interval(), stepper.imaginary_interval());
+    move |_| intervals
+}
+
 /// a/x + b/y, in 1/time.
-fn share<S: State>(rate: Rate, stepper: &(impl Stepper<S> + ?Sized)) -> f64 {
+fn share(rate: Rate, (x, y): (f64, f64)) -> f64 {
     let part = |rate: f64, interval: f64| if rate > 0.0 { rate / interval } else { 0.0 };
-    part(rate.decay, stepper.negative_real_interval()) + part(rate.oscillation, stepper.imaginary_interval())
+    part(rate.decay, x) + part(rate.oscillation, y)
 }

@@ -115,6 +115,12 @@ pub trait SceneTerm<const D: usize, E: Fields>: Sync {
         None
     }
 
+    /// The numerical viscosity of order 1 at particle p, which is at x.
+    fn viscosity(&self, p: usize, x: &[f64; D], t: f64) -> f64 {
+        let _ = (p, x, t);
+        0.0
+    }
+
     /// Whether the velocity is the same at all times.
     fn steady(&self) -> bool {
         true

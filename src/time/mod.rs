@@ -3,6 +3,7 @@
 mod entry;
 mod euler;
 mod exponential;
+mod implicit;
 mod integrate;
 mod lattice;
 mod leapfrog;
@@ -19,6 +20,7 @@ mod wide_gaussian;
 pub use entry::Entry;
 pub use euler::Euler;
 pub use exponential::Exponential;
+pub use implicit::Implicit;
 pub use integrate::{Run, integrate};
 pub use lattice::LatticeSpectrum;
 pub use leapfrog::Leapfrog;

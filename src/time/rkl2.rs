@@ -198,6 +198,10 @@ impl<S: State> Stepper<S> for Rkl2<S> {
         2
     }
 
+    fn check_symmetry(&self, symmetry: Symmetry) -> Result<()> {
+        self.check_rows(symmetry)
+    }
+
     fn negative_real_interval(&self) -> f64 {
         let s = self.stages;
         // P_s(-1) is 1 for even s; for odd s it is -1, and the factor reaches -1 a little beyond.
