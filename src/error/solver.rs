@@ -127,6 +127,11 @@ kinds! {
             /// Time.
             t: f64,
         } => "the source of field {field} at t = {t} is not finite",
+        /// A velocity that depends on time, where a scene is to be at rest.
+        Unsteady {
+            /// The time at which it was asked for.
+            t: f64,
+        } => "the velocity depends on time: nothing is at rest at t = {t}",
         /// A source that is not affine in u, where a steady problem needs one.
         NotAffine {
             /// The source at u = 2.

@@ -5,6 +5,7 @@ use super::fields::Fields;
 use super::ledger::LedgerRow;
 use super::limits::{Limits, Rate};
 use super::policy::{GrowthPolicy, StepPolicy};
+use super::saved::SavedRun;
 use super::scene::Scene;
 use super::scheme::TimeScheme;
 use super::semi_discrete::SemiDiscrete;
@@ -119,6 +120,32 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         &self.discrete
     }
 
+    /// The run as it stands, with the field it has come to; the scene is not in it.
+    pub fn save(&self, u: &[S::Value]) -> SavedRun<S::Value, St>
+    where
+        St: Clone,
+    {
+        let (t, step, retries) = (self.t, self.ledger.step, self.ledger.retries);
+        SavedRun { t, step, retries, start: self.start.clone(), u: u.to_vec(), stepper: self.stepper.clone() }
+    }
+
+    /// Takes up a saved run with the same scene on the same particles, and returns the field: the steps that follow have
+    /// the bits they would have had. Policies and sharp rates stay those of this run.
+    ///
+    /// # Errors
+    /// [`TimeError::Shape`] for another number of particles or fields; the run is then as it was.
+    pub fn resume(&mut self, saved: SavedRun<S::Value, St>) -> Result<Vec<S::Value>> {
+        let SavedRun { t, step, retries, start, u, stepper } = saved;
+        let (points, fields) = (self.discrete.site().points().len(), <S::Value as Fields>::FIELDS);
+        let fits = [(u.len(), points), (start.len(), if start.is_empty() { 0 } else { fields })];
+        if let Some((found, needed)) = fits.into_iter().find(|(found, needed)| found != needed) {
+            return Err(TimeError::Shape { found, needed }.into());
+        }
+        (self.t, self.start, self.stepper) = (t, start, stepper);
+        (self.ledger.step, self.ledger.t, self.ledger.retries) = (step, t, retries);
+        Ok(u)
+    }
+
     /// What bounds a step from here.
     ///
     /// # Errors
@@ -175,6 +202,9 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     }
 
     fn step_to(&mut self, u: &mut Vec<S::Value>, dt: f64, end: f64) -> Result<&LedgerRow<D>> {
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(TimeError::Step { dt }.into());
+        }
         let limits = self.limits_at(self.t, u)?;
         let (limit, binding) = self.bound(&limits);
         let within = dt <= limit;

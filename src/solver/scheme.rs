@@ -72,10 +72,21 @@ stages!(Euler 1 Leapfrog 1 SspRk3 3 Rk4 4);
 /// explicitly, S(x, t, u^n) at the times of the scheme: one that depends on u costs the second order and is stable while its
 /// rate keeps to 2/dt.
 #[derive(Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct ImplicitScheme<E: Fields = f64> {
     theta: f64,
+    /// Matrix and factors, made anew after saving or cloning.
+    #[cfg_attr(feature = "serde", serde(skip))]
     held: Option<Implicit<E>>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     before: Vec<E>,
+}
+
+impl<E: Fields> Clone for ImplicitScheme<E> {
+    fn clone(&self) -> Self {
+        Self { theta: self.theta, held: None, before: Vec::new() }
+    }
 }
 
 impl<E: Fields> ImplicitScheme<E> {

@@ -160,6 +160,11 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
     /// # Errors
     /// As [`CsrMatrix::from_triplets`].
     pub fn matrix(&mut self, t: f64) -> Result<CsrMatrix> {
+        self.matrix_with(t, |_| 0.0)
+    }
+
+    /// The same with a diagonal of its own added inside.
+    pub(super) fn matrix_with(&mut self, t: f64, own: impl Fn(usize) -> f64) -> Result<CsrMatrix> {
         self.scene.advection_term().refresh(&mut self.advection, &self.site, t, &[])?;
         let points = self.site.points();
         let mut prescribed = vec![false; points.len()];
@@ -177,12 +182,19 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
             let mut entry = |q: usize, value: f64| triplets.push((p, q, value));
             self.scene.diffusion_term().entries(&self.diffusion, p, x, t, &mut entry);
             self.scene.advection_term().entries(&self.advection, p, x, t, &mut entry);
+            entry(p, own(p));
         }
         let mut matrix = CsrMatrix::from_triplets(points.len(), points.len(), triplets)?;
         if let Some(rows) = self.scene.edge().rows(&self.edge) {
             rows.replace_in(&mut matrix)?;
         }
         Ok(matrix)
+    }
+
+    /// S at particle p; zero beyond the particles.
+    pub(super) fn source(&self, p: usize, t: f64, u: &[S::Value]) -> S::Value {
+        let of = |x| self.scene.source_term().rate(&self.source, p, x, t, u, S::Value::ZERO);
+        self.site.points().get(p).map_or(S::Value::ZERO, of)
     }
 
     /// Writes what stands beside A u: the source S(x, t, u) inside, the values g of the conditions at their particles.
