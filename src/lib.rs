@@ -68,7 +68,7 @@ pub use moment::{
 };
 pub use multi_index::*;
 pub use neighbors::{
-    BruteForce, Canonical, CellList, Nearest, NeighborList, Neighbors, Selected, epsilon_from_neighbors,
+    BruteForce, Canonical, CellList, Nearest, NeighborList, Neighbors, Selected, Upstream, epsilon_from_neighbors,
     mean_neighbor_distance, volumes_from_neighbors,
 };
 pub use operator::*;

@@ -8,6 +8,8 @@ mod export;
 mod faer_matrix;
 mod gmres;
 mod ilu;
+mod invariant;
+mod krylov;
 #[cfg(feature = "faer")]
 mod lu;
 mod matrix_market;
@@ -15,6 +17,7 @@ mod norm;
 mod replace;
 mod shifted;
 mod solver;
+mod spectrum;
 mod stop;
 
 pub use bicgstab::BiCgStab;
@@ -23,4 +26,5 @@ pub use gmres::Gmres;
 pub use ilu::Ilu0;
 pub(crate) use matrix_market::Counted;
 pub use solver::SparseSolver;
+pub use spectrum::{Spectrum, SpectrumEstimator};
 pub use stop::SolveReport;

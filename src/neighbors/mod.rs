@@ -14,6 +14,7 @@ mod placed;
 mod row_check;
 mod selected;
 mod table;
+mod upstream;
 
 pub use brute_force::BruteForce;
 pub use canonical::Canonical;
@@ -22,6 +23,7 @@ pub use list::NeighborList;
 pub use measure::{epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors};
 pub use nearest::Nearest;
 pub use selected::Selected;
+pub use upstream::Upstream;
 
 use crate::error::Result;
 use crate::stencil::{Neighbor, Stencil};
