@@ -115,6 +115,10 @@ impl<V: Velocity<D>, X: Transport<D>, W: FlowDivergence<D>, const D: usize, E: F
         Some(built.rows.report())
     }
 
+    fn monotone(&self, built: &Self::Rows) -> bool {
+        W::ZERO && built.rows.monotone()
+    }
+
     fn velocity(&self, p: usize, x: &[f64; D], t: f64) -> Option<[f64; D]> {
         Some(self.velocity.at(p, x, t))
     }

@@ -86,7 +86,7 @@ pub trait Edge<const D: usize, E: Fields>: Sync {
         neighbors: &P,
     ) -> Result<Self::State>;
 
-    /// Writes the boundary values of time t into u.
+    /// Writes the boundary values of time t into u; with `zero` those of the same conditions with g = 0.
     ///
     /// # Errors
     /// As [`BoundaryRows::impose`].
@@ -96,6 +96,7 @@ pub trait Edge<const D: usize, E: Fields>: Sync {
         site: &Site<D>,
         flow: &dyn Fn(usize, f64) -> Option<[f64; D]>,
         t: f64,
+        zero: bool,
         u: &mut [E],
     ) -> Result<()>;
 
@@ -135,6 +136,7 @@ impl<const D: usize, E: Fields> Edge<D, E> for () {
         _: &Site<D>,
         _: &dyn Fn(usize, f64) -> Option<[f64; D]>,
         _: f64,
+        _: bool,
         _: &mut [E],
     ) -> Result<()> {
         Ok(())
@@ -217,10 +219,12 @@ impl<G: Fn(usize, &[f64; D], f64) -> E + Sync, const D: usize, E: Fields> Edge<D
         site: &Site<D>,
         flow: Flow<'_, D>,
         t: f64,
+        zero: bool,
         u: &mut [E],
     ) -> Result<()> {
         let points = site.points();
-        let g = |p: usize| points.get(p).map_or(E::ZERO, |x| (self.values)(p, x, t));
+        let given = |p: usize| points.get(p).map_or(E::ZERO, |x| (self.values)(p, x, t));
+        let g = |p: usize| if zero { E::ZERO } else { given(p) };
         for (i, &(p, _)) in self.boundary.inflow.iter().enumerate() {
             if self.comes_in(i, flow, t) {
                 let value = g(p);

@@ -18,6 +18,7 @@ mod edge;
 mod eulerian;
 mod fields;
 mod free;
+mod growth;
 mod ledger;
 mod limits;
 mod policy;

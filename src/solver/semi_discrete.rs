@@ -91,12 +91,12 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
             return Err(TimeError::Shape { found, needed }.into());
         }
         if !<S::Edge as Edge<D, S::Value>>::PRESENT {
-            return self.inside(t, u, du);
+            return self.inside::<true>(t, u, du);
         }
         let mut room = S::Edge::room(&mut self.edge);
         room.clear();
         room.extend_from_slice(u);
-        let done = self.impose(t, &mut room).and_then(|()| self.inside(t, &room, du));
+        let done = self.impose(t, &mut room).and_then(|()| self.inside::<true>(t, &room, du));
         S::Edge::give_back(&mut self.edge, room);
         done?;
         self.each_prescribed(t, |p| {
@@ -107,8 +107,21 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
         Ok(())
     }
 
-    /// du/dt of a field that has its boundary values.
-    fn inside(&mut self, t: f64, u: &[S::Value], du: &mut [S::Value]) -> Result<()> {
+    /// du/dt of the diffusion and advection terms with boundary conditions whose values are zero, which are written into u.
+    pub(super) fn linear(&mut self, t: f64, u: &mut [S::Value], du: &mut [S::Value]) -> Result<()> {
+        self.impose_values(t, true, u)?;
+        self.inside::<false>(t, u, du)
+    }
+
+    /// Whether no term can have a growing mode, because none has a negative weight.
+    pub(super) fn cannot_grow(&self) -> bool {
+        let terms = self.scene.diffusion_term().monotone(&self.diffusion)
+            && self.scene.advection_term().monotone(&self.advection);
+        terms && !<S::Edge as Edge<D, S::Value>>::PRESENT
+    }
+
+    /// du/dt of a field that has its boundary values, with or without the source.
+    fn inside<const SOURCE: bool>(&mut self, t: f64, u: &[S::Value], du: &mut [S::Value]) -> Result<()> {
         let Self { scene, site, diffusion, advection, source, .. } = self;
         scene.diffusion_term().refresh(diffusion, site, t, u)?;
         scene.advection_term().refresh(advection, site, t, u)?;
@@ -120,7 +133,7 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
             let x = &points[p];
             let rate = k.rate(diffusion, p, x, t, u, S::Value::ZERO);
             let rate = a.rate(advection, p, x, t, u, rate);
-            s.rate(source, p, x, t, u, rate)
+            if SOURCE { s.rate(source, p, x, t, u, rate) } else { rate }
         });
         Ok(())
     }
@@ -130,10 +143,14 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
     /// # Errors
     /// As [`Edge::impose`].
     pub fn impose(&mut self, t: f64, u: &mut [S::Value]) -> Result<()> {
+        self.impose_values(t, false, u)
+    }
+
+    fn impose_values(&mut self, t: f64, zero: bool, u: &mut [S::Value]) -> Result<()> {
         let Self { scene, site, edge, .. } = self;
         let points = site.points();
         let flow = |p: usize, t: f64| points.get(p).and_then(|x| scene.advection_term().velocity(p, x, t));
-        scene.edge().impose(edge, site, &flow, t, u)
+        scene.edge().impose(edge, site, &flow, t, zero, u)
     }
 
     fn each_prescribed(&self, t: f64, mut particle: impl FnMut(usize)) {

@@ -109,6 +109,12 @@ pub trait SceneTerm<const D: usize, E: Fields>: Sync {
     /// What the build of the rows found.
     fn report<'a>(&self, rows: &'a Self::Rows) -> Option<&'a Report>;
 
+    /// Whether no weight on a neighbor is negative in the matrix of this term, so that none of its modes grows.
+    fn monotone(&self, rows: &Self::Rows) -> bool {
+        let _ = rows;
+        true
+    }
+
     /// The velocity at particle p, which is at x; `None` for a term that has none.
     fn velocity(&self, p: usize, x: &[f64; D], t: f64) -> Option<[f64; D]> {
         let _ = (p, x, t);

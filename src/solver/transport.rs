@@ -70,6 +70,11 @@ pub trait TransportRows<const D: usize, E: Fields>: Send + Sync {
         Rate::default()
     }
 
+    /// Whether no weight of -v . grad on a neighbor is negative, for any v.
+    fn monotone(&self) -> bool {
+        false
+    }
+
     /// The divergence of a velocity field at particle p, by central rows; `None` where the scheme has none.
     fn divergence(&self, p: usize, v: &[[f64; D]]) -> Option<f64> {
         let _ = (p, v);
