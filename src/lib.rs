@@ -52,7 +52,10 @@ mod solver;
 mod stencil;
 mod time;
 
-pub use apply::{Apply, Field, Histogram, MatrixFree, RawRows, Report, Row, Rows, Strided, UpwindRows, Vector};
+pub use apply::{
+    Advect, Apply, Field, Histogram, Hyperviscosity, MatrixFree, RawRows, Report, Row, Rows, SidedRows, Strided,
+    UpwindDcPse, UpwindRows, Vector,
+};
 pub use boundary::*;
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
 pub use error::*;

@@ -1,7 +1,9 @@
 //! The provider checker: ours pass, a provider written by a user passes, and every fault is caught.
 
 use parops::testing::{ProviderFault, check_provider, check_provider_against};
-use parops::{BruteForce, CellList, Cutoff, Domain, Face, Neighbor, NeighborList, Neighbors, Particles, Stencil};
+use parops::{
+    BruteForce, CellList, Cutoff, Domain, Face, Neighbor, NeighborList, Neighbors, Particles, Selected, Stencil,
+};
 
 /// A provider as a user would write it: equal points on a line, found by index arithmetic.
 struct Line {
@@ -62,6 +64,25 @@ fn our_providers_pass_on_mixed_faces() {
         assert_eq!(check_provider_against(&list, &oracle), Ok(()));
         assert_eq!(check_provider_against(&cells.canonical(), &oracle), Ok(()));
     }
+}
+
+#[test]
+fn selected_targets_pass_and_keep_the_rows_of_the_others() {
+    let particles = Particles::random([0.0; 2], [1.0; 2], 150, 4).unwrap();
+    let torus = Domain::periodic([0.0; 2], [1.0; 2]).unwrap();
+    let cells = CellList::build(&particles, &torus, Cutoff(0.3)).unwrap();
+    let some = Selected::new(&cells, &[149, 3, 3, 70]).unwrap();
+    assert_eq!((some.targets(), some.sources(), some.selection()), (4, 150, &[149, 3, 3, 70][..]));
+    assert_eq!(check_provider(&some), Ok(()));
+    let (mut one, mut other) = (Stencil::default(), Stencil::default());
+    for (i, &p) in some.selection().iter().enumerate() {
+        some.gather(i, 0.2, &mut one);
+        cells.gather(p, 0.2, &mut other);
+        assert_eq!((one.target(), one.center(), one.cutoff()), (i, Some(p), 0.2));
+        assert!(one.iter().eq(other.iter()) && some.count(i, 0.2) == one.len() && !one.is_empty());
+    }
+    let error = Selected::new(&cells, &[0, 150]).unwrap_err();
+    assert_eq!(error.to_string(), "target 150 does not exist among 150");
 }
 
 #[test]
