@@ -109,6 +109,9 @@ pub trait Edge<const D: usize, E: Fields>: Sync {
     /// Calls `particle` for every particle whose value is prescribed at time t.
     fn each_prescribed(&self, flow: &dyn Fn(usize, f64) -> Option<[f64; D]>, t: f64, particle: &mut dyn FnMut(usize));
 
+    /// Whether no condition is about a flux: prescribed values let no mode grow that would not without them.
+    fn values_only(&self) -> bool;
+
     /// The rows of the conditions and the value of each, for steady problems.
     fn rows<'a>(&self, state: &'a Self::State) -> Option<&'a BoundaryRows>;
 
@@ -149,6 +152,10 @@ impl<const D: usize, E: Fields> Edge<D, E> for () {
     fn give_back((): &mut (), _: Vec<E>) {}
 
     fn each_prescribed(&self, _: &dyn Fn(usize, f64) -> Option<[f64; D]>, _: f64, _: &mut dyn FnMut(usize)) {}
+
+    fn values_only(&self) -> bool {
+        true
+    }
 
     fn rows<'a>(&self, (): &'a ()) -> Option<&'a BoundaryRows> {
         None
@@ -205,6 +212,7 @@ impl<G: Fn(usize, &[f64; D], f64) -> E + Sync, const D: usize, E: Fields> Edge<D
             };
             return Err(Error::from(kind).at(p));
         }
+        site.open(inflow);
         let rows = BoundaryRows::build(conditions, *order, neighbors)?;
         site.prescribe(conditions.iter().map(BoundaryCondition::particle));
         if steady {
@@ -267,6 +275,10 @@ impl<G: Fn(usize, &[f64; D], f64) -> E + Sync, const D: usize, E: Fields> Edge<D
                 particle(p);
             }
         }
+    }
+
+    fn values_only(&self) -> bool {
+        self.boundary.conditions.iter().all(|condition| condition.factors().1 == 0.0)
     }
 
     fn rows<'a>(&self, state: &'a BoundedState<E>) -> Option<&'a BoundaryRows> {

@@ -99,25 +99,32 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
         let done = self.impose(t, &mut room).and_then(|()| self.inside::<true>(t, &room, du));
         S::Edge::give_back(&mut self.edge, room);
         done?;
-        self.each_prescribed(t, |p| {
-            if let Some(du) = du.get_mut(p) {
-                *du = S::Value::ZERO;
-            }
-        });
+        self.hold(t, du);
         Ok(())
     }
 
     /// du/dt of the diffusion and advection terms with boundary conditions whose values are zero, which are written into u.
     pub(super) fn linear(&mut self, t: f64, u: &mut [S::Value], du: &mut [S::Value]) -> Result<()> {
         self.impose_values(t, true, u)?;
-        self.inside::<false>(t, u, du)
+        self.inside::<false>(t, u, du)?;
+        self.hold(t, du);
+        Ok(())
+    }
+
+    /// Sets the rates of prescribed values to zero.
+    fn hold(&self, t: f64, du: &mut [S::Value]) {
+        self.each_prescribed(t, |p| {
+            if let Some(du) = du.get_mut(p) {
+                *du = S::Value::ZERO;
+            }
+        });
     }
 
     /// Whether no term can have a growing mode, because none has a negative weight.
     pub(super) fn cannot_grow(&self) -> bool {
         let terms = self.scene.diffusion_term().monotone(&self.diffusion)
             && self.scene.advection_term().monotone(&self.advection);
-        terms && !<S::Edge as Edge<D, S::Value>>::PRESENT
+        terms && self.scene.edge().values_only()
     }
 
     /// du/dt of a field that has its boundary values, with or without the source.

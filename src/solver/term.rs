@@ -13,6 +13,8 @@ pub struct Site<const D: usize> {
     particles: Particles<D>,
     /// Empty where no value is prescribed.
     prescribed: Vec<bool>,
+    /// Particles with outward normals where the flow may come in.
+    inflow: Vec<(usize, [f64; D])>,
 }
 
 impl<const D: usize> Site<D> {
@@ -31,7 +33,7 @@ impl<const D: usize> Site<D> {
         if rows != set {
             return Err(crate::error::ApplyError::Stale { rows, set }.into());
         }
-        Ok(Self { particles: particles.clone(), prescribed: Vec::new() })
+        Ok(Self { particles: particles.clone(), prescribed: Vec::new(), inflow: Vec::new() })
     }
 
     /// The particles.
@@ -59,6 +61,17 @@ impl<const D: usize> Site<D> {
                 *prescribed = true;
             }
         }
+    }
+
+    /// Says where the flow may come in.
+    pub(super) fn open(&mut self, inflow: &[(usize, [f64; D])]) {
+        self.inflow.extend_from_slice(inflow);
+    }
+
+    /// Whether a velocity v comes in at particle p, where an inflow condition stands.
+    pub(super) fn comes_in(&self, p: usize, v: &[f64; D]) -> bool {
+        let inward = |normal: &[f64; D]| v.iter().zip(normal).fold(0.0, |sum, (v, n)| sum + v * n) < 0.0;
+        self.inflow.iter().any(|(q, normal)| *q == p && inward(normal))
     }
 
     /// Every particle with its point, the prescribed ones left out.
