@@ -167,7 +167,8 @@ fn methods_are_interchangeable_on_one_scene() -> Result<()> {
         neighbors: &impl parops::Neighbors<2>,
         exact: impl Fn(&[f64; 2]) -> f64,
     ) -> Result<f64> {
-        let mut run = Eulerian::new(scene, set, neighbors, SspRk3::new())?;
+        let (steps, growth) = (StepPolicy::Refuse, GrowthPolicy::Unknown);
+        let mut run = Eulerian::with_policy(scene, set, neighbors, SspRk3::new(), steps, growth)?;
         let mut u: Vec<f64> = set.points().iter().map(|x| 1.0 + (TAU * x[0]).sin()).collect();
         run.advance(&mut u, END, 2e-3)?;
         Ok(set.points().iter().zip(&u).map(|(x, u)| (u - exact(x)).abs()).fold(0.0, f64::max))

@@ -36,18 +36,18 @@ fn a_source_that_is_no_number_names_particle_stage_and_time() -> Result<()> {
     const DT: f64 = 1.0 / 1024.0;
     let (particles, neighbors) = set(10)?;
     let bad = particles.points()[37];
-    for (from, stage, t) in [(4.0 * DT, 1, 4.0 * DT), (4.25 * DT, 2, 4.5 * DT), (4.75 * DT, 4, 5.0 * DT)] {
+    for (steps, from, stage, t) in [(0, 0.0, 1, 0.0), (4, 4.25 * DT, 2, 4.5 * DT), (4, 4.75 * DT, 4, 5.0 * DT)] {
         let source = move |x: &[f64; 2], t: f64, u: f64| if *x == bad && t >= from { f64::NAN } else { -u };
         let mut run = Eulerian::new(diffusion(0.01).source(source), &particles, &neighbors, Rk4::new())?;
         let mut u = wave(&particles);
-        for _ in 0..4 {
+        for _ in 0..steps {
             run.step(&mut u, DT)?;
         }
         let (before, ledger) = (bits(&u), run.ledger().clone());
         let error = run.step(&mut u, DT).err().unwrap();
         assert_eq!(*error.kind(), ErrorKind::Time(TimeError::NotFinite { stage, t }), "{error}");
         assert_eq!((error.particle(), bits(&u)), (Some(37), before));
-        assert_eq!((run.time(), run.ledger()), (4.0 * DT, &ledger));
+        assert_eq!((run.time(), run.ledger()), (f64::from(steps) * DT, &ledger));
     }
     Ok(())
 }
@@ -70,7 +70,8 @@ fn a_panic_in_a_function_of_the_scene_leaves_the_field_and_the_run() -> Result<(
         let mut u = wave(&particles);
         run.step(&mut u, dt)?;
         let (before, t) = (bits(&u), run.time());
-        for after in [0, 250, 350, 599, 610] {
+        // Two values a particle for the limit, then four stages; the last is in the second substep where there is one.
+        for after in [0, 250, 350, if policy == StepPolicy::Refuse { 599 } else { 910 }] {
             left.store(after, Ordering::Relaxed);
             assert!(catch_unwind(AssertUnwindSafe(|| run.step(&mut u, dt).map(|_| ()))).is_err());
             assert_eq!((bits(&u), run.time()), (before.clone(), t));
@@ -177,8 +178,8 @@ fn schemes_that_suit_no_term_are_refused_at_once() -> Result<()> {
     assert!(Eulerian::new(diffusion(0.1), &particles, &neighbors, Rkl2::new(40)?).is_ok());
     let error = Eulerian::new(diffusion(0.1), &particles, &neighbors, Rkl2::new(41)?).err().unwrap();
     assert!(matches!(error.kind(), ErrorKind::Time(TimeError::Stages { stages: 41, high: 40, .. })), "{error}");
-    let lattice = Particles::lattice([0.0; 2], [1.0; 2], [16; 2])?;
-    let pse = Pse::new(Laplacian::<2>, 2, lattice.spacing()?.epsilon(1.0)?, lattice.volumes()?)?;
+    let lattice = Particles::lattice([0.0; 2], [1.0; 2], [24; 2])?;
+    let pse = Pse::new(Laplacian::<2>, 2, lattice.spacing()?.epsilon(1.5)?, lattice.volumes()?)?;
     let near = CellList::build(&lattice, &Domain::periodic([0.0; 2], [1.0; 2])?, pse.cutoff())?;
     let scene = || AdvectionDiffusion::<2>::new().diffusion(0.1, pse.clone());
     assert!(Eulerian::new(scene(), &lattice, &near, Rkl2::new(200)?).is_ok());
@@ -224,7 +225,8 @@ fn growing_modes_are_refused_unless_allowed_and_then_recorded() -> Result<()> {
     let steps = StepPolicy::Refuse;
     let mut run = Eulerian::with_policy(scene(), &particles, &neighbors, Rk4::new(), steps, GrowthPolicy::Allow)?;
     let mut u: Vec<f64> = (0..particles.len()).map(|p| f64::from(u8::from(p == 100))).collect();
-    let dt = 0.5 * run.limits(&u)?.step(&Rk4::<Vec<f64>>::new());
+    // Short enough that RK4 damps nothing of a mode that oscillates.
+    let dt = 0.1 * run.limits(&u)?.step(&Rk4::<Vec<f64>>::new());
     let size = |u: &[f64]| u.iter().map(|u| u * u).sum::<f64>().sqrt();
     let mut ledger = Ledger::default();
     run.advance_with(&mut u, 4.0, dt, |row, _| ledger.push(row))?;

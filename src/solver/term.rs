@@ -106,7 +106,8 @@ pub trait SceneTerm<const D: usize, E: Fields>: Sync {
         Ok(())
     }
 
-    /// Adds the share of this term in du_p/dt to `rate`, for particle p at x.
+    /// Adds the share of this term in du_p/dt to `rate`, for particle p at x; p and u are of the set the rows were made for,
+    /// which [`SemiDiscrete`](crate::SemiDiscrete) checks once for all particles.
     fn rate(&self, rows: &Self::Rows, p: usize, x: &[f64; D], t: f64, u: &[E], rate: E) -> E;
 
     /// Adds what bounds the step at this time.
