@@ -28,7 +28,9 @@
 //! ```
 //!
 //! # Features
-//! `faer`: sparse LU for coupled boundary conditions and steady problems; matrices as those of that package.
+//! `faer`: sparse LU for coupled boundary conditions, steady problems and implicit steps; matrices as those of that
+//! package.
+//! `kiddo`: a neighbor provider over an immutable k-d tree.
 //! `rayon`: rows are built and applied by several threads, with the same bits for any number of them.
 //! `serde`: rows and reports saved and read back bit for bit.
 //! `testing`: conformance checkers for kernels, providers, methods and steppers, ours and the user's own.
@@ -41,6 +43,7 @@ mod exp;
 mod kernel;
 mod lanes;
 mod linear;
+mod mesh;
 mod moment;
 mod multi_index;
 mod neighbors;
@@ -54,25 +57,29 @@ mod time;
 
 pub use apply::{
     Advect, Apply, Field, Histogram, Hyperviscosity, MatrixFree, RawRows, Report, Row, Rows, SidedRows, Strided,
-    UpwindDcPse, UpwindRows, Vector,
+    SymmetricPse, UpwindDcPse, UpwindRows, Vector,
 };
 pub use boundary::*;
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
 pub use error::*;
 pub use kernel::{
-    AnisotropicGaussian, ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, OneSidedGaussian, Rational,
-    SmoothingKernel, WideGaussian,
+    AnisotropicGaussian, Cic, CubicSpline, ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Lambda,
+    LatticeHat, MeshKernel, Ngp, OneSidedGaussian, QuinticSpline, Rational, RationalLaplacian, SmoothingKernel, Tsc,
+    WendlandC2, WendlandC4, WendlandC6, WideGaussian,
 };
 pub use linear::*;
+pub use mesh::{Centering, Dropped, Mesh, MeshStencil, Remeshed};
 pub use moment::{
     CenterTerm, Cholesky, Ladder, Lu, MomentScratch, MomentSolver, MomentSystem, PivotedQr, Qr, Quadrature, Residual,
     Rung, Solution, Window, continuous_moment, continuous_moments, discrete_moment, discrete_moments,
     moment_conditions, required_moment,
 };
 pub use multi_index::*;
+#[cfg(feature = "kiddo")]
+pub use neighbors::KdTree;
 pub use neighbors::{
-    BruteForce, Canonical, CellList, Nearest, NeighborList, Neighbors, Selected, Upstream, epsilon_from_neighbors,
-    mean_neighbor_distance, volumes_from_neighbors,
+    BruteForce, Canonical, CellList, HalfList, Nearest, NeighborList, Neighbors, Pair, Selected, Symmetry, Upstream,
+    VerletList, epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors,
 };
 pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};

@@ -10,7 +10,7 @@ fn one_of_each() -> Vec<(ErrorKind, &'static [&'static str])> {
     vec![
         (MultiIndexError::UnequalDegree { first: 2, other: 7 }.into(), &["2", "7"]),
         (MultiIndexError::Count { dim: 31, degree: 41, order: 59 }.into(), &["31", "41", "59"]),
-        (KernelError::Regularity { degree: 4, limit: 3 }.into(), &["4", "3"]),
+        (KernelError::Regularity { kernel: "Spline", degree: 4, limit: 3 }.into(), &["Spline", "4", "3"]),
         (DomainError::Faces { axis: 1, lower: 0.75, upper: -0.25 }.into(), &["axis 1", "0.75", "-0.25"]),
         (ParticleError::Coordinate { axis: 2, coordinate: f64::NAN }.into(), &["axis 2", "NaN"]),
         (NeighborError::Reach { cutoff: 0.5, reach: 0.375 }.into(), &["0.5", "0.375"]),

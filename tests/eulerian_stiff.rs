@@ -2,7 +2,7 @@
 
 use parops::{
     AdvectionDiffusion, CellList, DcPse, Domain, ErrorKind, Euler, Eulerian, Gradient, ImplicitScheme, Laplacian,
-    Limit, Nearest, Particles, Pse, Result, Rkl2, Scene, SolverError, SspRk3, StepLimit, StepPolicy, Symmetry,
+    Limit, Nearest, Particles, Pse, Result, Rkl2, RowSymmetry, Scene, SolverError, SspRk3, StepLimit, StepPolicy,
     UpwindGradient,
 };
 
@@ -69,7 +69,7 @@ fn super_time_stepping_takes_substeps_or_refuses_with_their_number() -> Result<(
     let row = run.step(&mut u, dt / 1000.0)?;
     assert_eq!((row.substeps, row.within_limit), (3, true));
     let limit = StepLimit::from_spectral_bound(rate, 1.0)?;
-    let own = Rkl2::for_decay(&limit, dt / 1000.0, Symmetry::General)?;
+    let own = Rkl2::for_decay(&limit, dt / 1000.0, RowSymmetry::General)?;
     assert_eq!(own.substeps(), 3);
     let mut run = Eulerian::new(scene(), &particles, &neighbors, own)?.step_policy(StepPolicy::Allow);
     run.step(&mut u, dt / 1000.0)?;

@@ -97,7 +97,7 @@ impl Quartic {
     fn spline<T: Scalar>(n: u8, x: T) -> Result<T> {
         let power = 4 - i32::from(n);
         let front = [1.0 / 24.0, 1.0 / 6.0, 0.5].get(usize::from(n));
-        let front = *front.ok_or(KernelError::Regularity { degree: n.into(), limit: 2 })?;
+        let front = *front.ok_or(KernelError::Regularity { kernel: "foreign", degree: n.into(), limit: 2 })?;
         let mut sum = T::zero();
         for (j, binomial) in [1.0, -5.0, 10.0].into_iter().enumerate() {
             let left = T::lift(2.5 - j as f64) - x.abs();
@@ -175,7 +175,7 @@ fn foreign_smoothing_kernel_serves_sph_and_volumes() -> Result<()> {
         assert!((g[0] - exact).abs() < 0.07 * TAU);
     }
     let third = Sph::new(parops::D2::<3, 0>::default(), quartic, epsilon, &volumes).unwrap_err();
-    assert_eq!(*third.kind(), ErrorKind::Kernel(KernelError::Regularity { degree: 3, limit: 2 }));
+    assert_eq!(*third.kind(), ErrorKind::Kernel(KernelError::Regularity { kernel: "foreign", degree: 3, limit: 2 }));
     Ok(())
 }
 

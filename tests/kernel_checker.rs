@@ -45,7 +45,7 @@ impl<const D: usize> Spline<D> {
             2 if a < 1.0 => 3.0 * a - 2.0,
             2 if a < 2.0 => outer,
             0..=2 => 0.0,
-            _ => return Err(KernelError::Regularity { degree: degree.into(), limit: 2 }.into()),
+            _ => return Err(KernelError::Regularity { kernel: "Spline", degree: degree.into(), limit: 2 }.into()),
         })
     }
 }
@@ -298,7 +298,7 @@ impl Kernel<f64, 1> for Uneven {
 impl SmoothingKernel<f64, 1> for Uneven {
     fn derivative(&self, beta: MultiIndex<1>, z: &[f64; 1]) -> Result<f64> {
         if beta.degree() > self.limit {
-            return Err(KernelError::Regularity { degree: beta.degree(), limit: self.limit }.into());
+            return Err(KernelError::Regularity { kernel: "Uneven", degree: beta.degree(), limit: self.limit }.into());
         }
         let factor = if beta.degree() == 2 { self.slope } else { 1.0 };
         Ok(factor * self.inner.derivative(beta, z)?)
@@ -355,7 +355,7 @@ impl Kernel<f64, 1> for NotSmoothing {
 
 impl SmoothingKernel<f64, 1> for NotSmoothing {
     fn derivative(&self, beta: MultiIndex<1>, _: &[f64; 1]) -> Result<f64> {
-        Err(KernelError::Regularity { degree: beta.degree(), limit: 0 }.into())
+        Err(KernelError::Regularity { kernel: "NotSmoothing", degree: beta.degree(), limit: 0 }.into())
     }
     fn normalization(&self) -> f64 {
         1.0

@@ -12,6 +12,7 @@ const LAYERS: &[&[&str]] = &[
     &["operator"],
     &["domain", "particles", "neighbors"],
     &["apply"],
+    &["mesh"],
     &["linear"],
     &["boundary"],
     &["time"],

@@ -9,7 +9,10 @@ use parops::{
     Neighbors, OneSided, Particles, Pse, Rk4, Rkl2, Side, Sph, SspRk3, Stencil, Stepper, Upwind,
 };
 #[cfg(not(feature = "rayon"))]
-use parops::{Apply, BoundaryCondition, BoundaryRows, NeighborList, Rows, Strided};
+use parops::{
+    Apply, BiCgStab, BoundaryCondition, BoundaryRows, CsrMatrix, Gmres, Implicit, NeighborList, Rows, SparseSolver,
+    Strided,
+};
 
 struct Counting;
 
@@ -203,6 +206,33 @@ fn applying_stored_rows_allocates_nothing_and_matrix_free_nothing_after_the_firs
 
 #[cfg(not(feature = "rayon"))]
 #[test]
+fn sums_over_pairs_allocate_nothing_and_symmetric_pse_nothing_after_the_first_time() {
+    let (particles, domain) = particles();
+    let (n, pse) = (particles.len(), laplacian(&particles));
+    let cells = CellList::build(&particles, &domain, pse.cutoff()).unwrap();
+    let half = pse.symmetric(&cells).unwrap();
+    let (f, mut out) = (vec![1.0; n], vec![0.0; n]);
+    half.apply(&f, &mut out).unwrap();
+    assert_eq!(allocations(|| half.apply(&f, &mut out).unwrap()), 0);
+    let mut sums = vec![[0.0; 2]; n];
+    let symmetry = [parops::Symmetry::Conserved; 2];
+    assert_eq!(allocations(|| half.pairs().accumulate(symmetry, &mut sums, |pair| pair.separation).unwrap()), 0);
+}
+
+#[test]
+fn updates_that_reuse_the_rows_of_a_verlet_list_allocate_nothing() {
+    let (particles, domain) = particles();
+    let mut list = parops::VerletList::build(&particles, &domain, parops::Cutoff(0.1), 0.05).unwrap();
+    for by in [0.01, -0.015, 0.0] {
+        let mut moved = particles.clone();
+        moved.set_points(&particles.points().iter().map(|x| x.map(|x| x + by)).collect::<Vec<_>>()).unwrap();
+        assert_eq!(allocations(|| assert_eq!(list.update(&moved), Ok(false))), 0);
+        assert_eq!(allocations(|| assert!((0..particles.len()).all(|p| list.count(p, 0.1) > 10))), 0);
+    }
+}
+
+#[cfg(not(feature = "rayon"))]
+#[test]
 fn solves_after_the_first_allocate_nothing() -> parops::Result<()> {
     let (n, chain) = (300, |i: usize| [(i, i, 4.0), (i, (i + 1) % 300, -1.0), (i, (i + 17) % 300, -2.0)]);
     let matrix = parops::CsrMatrix::from_triplets(n, n, (0..n).flat_map(chain))?;
@@ -269,4 +299,53 @@ fn eulerian_steps_after_the_first_allocate_nothing() -> parops::Result<()> {
     assert_eq!(allocations(|| (0..3).for_each(|_| assert!(cut.step(&mut u, 0.01).is_ok()))), 0);
     assert!(cut.ledger().substeps > 1);
     Ok(())
+}
+
+#[cfg(not(feature = "rayon"))]
+#[test]
+fn implicit_steps_after_the_first_allocate_nothing() {
+    let (particles, domain) = particles();
+    let pse = laplacian(&particles);
+    let rows = pse.assemble(&CellList::build(&particles, &domain, pse.cutoff()).unwrap()).unwrap();
+    let solvers: &[fn(CsrMatrix) -> parops::Result<SparseSolver>] = &[
+        |matrix| SparseSolver::bicgstab(matrix, BiCgStab::new()),
+        |matrix| SparseSolver::gmres(matrix, Gmres::new()),
+        #[cfg(feature = "faer")]
+        SparseSolver::lu,
+    ];
+    for &solver in solvers {
+        let mut stepper = Implicit::crank_nicolson(rows.to_csr(0).unwrap()).unwrap().solver(solver);
+        let mut u: Vec<[f32; 2]> = particles.points().iter().map(|x| [x[0] as f32, 1.0]).collect();
+        let mut step = |n: u32| {
+            let source = &mut |t: f64, g: &mut [[f32; 2]]| {
+                g.fill([t as f32, 0.0]);
+                Ok(())
+            };
+            stepper.step(0.1 * f64::from(n), 0.1, &mut u, source).unwrap();
+        };
+        assert!(allocations(|| step(0)) > 0);
+        assert_eq!(allocations(|| (1..6).for_each(&mut step)), 0);
+    }
+}
+
+#[test]
+fn transfers_between_particles_and_mesh_allocate_nothing() {
+    use parops::{Lambda, Mesh, MeshKernel};
+    let mesh = Mesh::nodes(&Domain::periodic([0.0; 3], [1.0; 3]).unwrap(), [8; 3]).unwrap();
+    let kernel = Lambda::<4, 2>::new().unwrap();
+    let particles = Particles::jittered([0.0; 3], [1.0; 3], [9; 3], 0.3, 1).unwrap();
+    let stencils = || {
+        for x in particles.points() {
+            std::hint::black_box(mesh.stencil(&kernel, x).unwrap().nodes().count());
+        }
+        std::hint::black_box(MeshKernel::<f32, 6>::weights(&kernel, 0.25));
+    };
+    assert_eq!(allocations(stencils), 0);
+    // The pool allocates, and the lists of several threads.
+    #[cfg(not(feature = "rayon"))]
+    {
+        let (strengths, mut values, mut out) = (vec![1.0; 729], vec![0.0; 512], vec![0.0; 729]);
+        assert_eq!(allocations(|| mesh.deposit(&kernel, particles.points(), &strengths, &mut values).unwrap()), 0);
+        assert_eq!(allocations(|| mesh.gather(&kernel, particles.points(), &values, &mut out).unwrap()), 0);
+    }
 }

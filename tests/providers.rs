@@ -2,7 +2,8 @@
 
 use parops::testing::{ProviderFault, check_provider, check_provider_against};
 use parops::{
-    BruteForce, CellList, Cutoff, Domain, Face, Neighbor, NeighborList, Neighbors, Particles, Selected, Stencil,
+    BruteForce, CellList, Cutoff, Domain, Face, Nearest, Neighbor, NeighborList, Neighbors, Particles, Random,
+    Selected, Stencil, VerletList,
 };
 
 /// A provider as a user would write it: equal points on a line, found by index arithmetic.
@@ -63,6 +64,14 @@ fn our_providers_pass_on_mixed_faces() {
         assert_eq!(check_provider_against(&cells, &oracle), Ok(()));
         assert_eq!(check_provider_against(&list, &oracle), Ok(()));
         assert_eq!(check_provider_against(&cells.canonical(), &oracle), Ok(()));
+        assert_eq!(check_provider_against(&Nearest::build(&particles, &domain, 12).unwrap(), &oracle), Ok(()));
+        let mut verlet = VerletList::build(&particles, &domain, Cutoff(0.4), 0.05).unwrap();
+        assert_eq!(check_provider(&verlet), Ok(()));
+        let mut moved = particles.clone();
+        moved.set_points(&particles.points().iter().map(|[x, y]| [x * 0.99, *y]).collect::<Vec<_>>()).unwrap();
+        assert_eq!(verlet.update(&moved), Ok(false));
+        let oracle = BruteForce::build(&moved, &domain, Cutoff(0.4)).unwrap();
+        assert_eq!((check_provider(&verlet), check_provider_against(&verlet, &oracle)), (Ok(()), Ok(())));
     }
 }
 
@@ -230,4 +239,90 @@ fn rows_that_change_when_asked_again_are_caught() {
     }
     let unsteady = Unsteady(Line { count: 8, spacing: 1.0 }, 0.into());
     assert_eq!(check_provider(&unsteady), Err(ProviderFault::Unsteady { p: 0 }));
+}
+
+/// A hundred random sets of four shapes and five sizes in domains of all kinds of faces, each built anew.
+fn after_updates<const D: usize, P: Neighbors<D>>(build: impl Fn(&Particles<D>, &Domain<D>, Cutoff) -> P, seed: u64) {
+    const AXES: [[Face; 2]; 4] = [
+        [Face::Periodic, Face::Periodic],
+        [Face::MirrorOdd, Face::MirrorEven],
+        [Face::Open, Face::Open],
+        [Face::MirrorEven, Face::Open],
+    ];
+    let mut random = Random::new(seed);
+    for update in 0..100 {
+        let domain = Domain::new([0.0; D], [1.0; D], std::array::from_fn(|axis| AXES[(update + axis) % 4])).unwrap();
+        let n = [0, 1, 2, 33, 120][update % 5];
+        let place = |x: f64| match update % 4 {
+            // Spread, clustered, ties on a lattice, and all in a few places.
+            0 => x,
+            1 => 0.9 + 1e-3 * x,
+            2 => (x * 8.0).floor() / 8.0,
+            _ => (x * 2.0).floor() / 2.0,
+        };
+        let points = (0..n).map(|_| std::array::from_fn(|_| place(random.uniform()))).collect();
+        let particles = Particles::new(points).unwrap();
+        let oracle = BruteForce::build(&particles, &domain, Cutoff(0.25)).unwrap();
+        assert_eq!(check_provider_against(&build(&particles, &domain, Cutoff(0.25)), &oracle), Ok(()), "{update}");
+    }
+}
+
+#[test]
+fn cell_lists_equal_brute_force_on_a_hundred_random_sets() {
+    after_updates::<1, _>(|particles, domain, cutoff| CellList::build(particles, domain, cutoff).unwrap(), 1);
+    after_updates::<2, _>(|particles, domain, cutoff| CellList::build(particles, domain, cutoff).unwrap(), 2);
+    after_updates::<3, _>(|particles, domain, cutoff| CellList::build(particles, domain, cutoff).unwrap(), 3);
+}
+
+#[test]
+fn nearest_neighbors_equal_brute_force_on_a_hundred_random_sets() {
+    after_updates::<1, _>(|particles, domain, _| Nearest::build(particles, domain, 6).unwrap(), 4);
+    after_updates::<2, _>(|particles, domain, _| Nearest::build(particles, domain, 9).unwrap(), 5);
+    after_updates::<3, _>(|particles, domain, _| Nearest::build(particles, domain, 12).unwrap(), 6);
+}
+
+#[cfg(feature = "kiddo")]
+mod tree {
+    use super::*;
+    use parops::{COORDINATE_HIGH, KdTree, LENGTH_HIGH, PARTICLES_HIGH};
+
+    #[test]
+    fn trees_equal_brute_force_on_a_hundred_random_sets() {
+        after_updates::<1, _>(|particles, domain, cutoff| KdTree::build(particles, domain, cutoff).unwrap(), 1);
+        after_updates::<2, _>(|particles, domain, cutoff| KdTree::build(particles, domain, cutoff).unwrap(), 2);
+        after_updates::<3, _>(|particles, domain, cutoff| KdTree::build(particles, domain, cutoff).unwrap(), 3);
+    }
+
+    #[test]
+    fn trees_serve_targets_of_their_own_and_pass_the_checker() {
+        let particles = Particles::random([0.0; 3], [1.0; 3], 400, 4).unwrap();
+        let domain = Domain::periodic([0.0; 3], [1.0; 3]).unwrap();
+        assert_eq!(check_provider(&KdTree::build(&particles, &domain, Cutoff(0.2)).unwrap()), Ok(()));
+        let targets: Vec<_> = (0..50).map(|i| [0.02 * f64::from(i); 3]).collect();
+        let tree = KdTree::build_at(&targets, &particles, &domain, Cutoff(0.2)).unwrap();
+        let oracle = BruteForce::build_at(&targets, &particles, &domain, Cutoff(0.2)).unwrap();
+        assert_eq!(check_provider_against(&tree, &oracle), Ok(()));
+        assert!((0..50).all(|p| tree.center(p).is_none()) && PARTICLES_HIGH > particles.len());
+    }
+
+    #[test]
+    fn coincident_and_aligned_points_and_far_coordinates_are_served() {
+        let same = |oracle: &BruteForce<3>, tree: &KdTree<3>| {
+            assert_eq!(check_provider_against(tree, oracle), Ok(()));
+        };
+        let check = |points: Vec<[f64; 3]>, cutoff: f64| {
+            let particles = Particles::new(points).unwrap();
+            let oracle = BruteForce::build(&particles, &Domain::open(), Cutoff(cutoff)).unwrap();
+            same(&oracle, &KdTree::build(&particles, &Domain::open(), Cutoff(cutoff)).unwrap());
+        };
+        // Far more points at one place than a leaf holds, 33 with one x, a line, and outliers at both ends.
+        check(vec![[0.5; 3]; 200], 0.1);
+        check((0..33).map(|i| [1.0, f64::from(i), f64::from(i * i % 7)]).collect(), 3.0);
+        check((0..100).map(|i| [f64::from(i), 0.0, -0.0]).collect(), 2.0);
+        let far = COORDINATE_HIGH;
+        check(vec![[far; 3], [far, -far, far], [0.0; 3], [far; 3], [1.0, 0.0, 0.0]], 1.0);
+        check(vec![[far; 3], [-far; 3], [0.0; 3], [f64::MIN_POSITIVE; 3], [5e-324; 3]], LENGTH_HIGH);
+        // More equal points than the index of a leaf of eight bits could count.
+        check((0..700).map(|i| [f64::from(i % 2), 0.0, 0.0]).collect(), 0.5);
+    }
 }

@@ -458,7 +458,10 @@ fn settings_are_checked() -> Failure {
     }
     let kernel = HighOrderGaussian::<2>::new(4)?;
     let rough = Sph::new(derivative([128, 128]), kernel, Epsilon::global(0.1)?, &volumes).unwrap_err();
-    assert_eq!(*rough.kind(), ErrorKind::Kernel(KernelError::Regularity { degree: 256, limit: 255 }));
+    assert_eq!(
+        *rough.kind(),
+        ErrorKind::Kernel(KernelError::Regularity { kernel: "HighOrderGaussian", degree: 256, limit: 255 })
+    );
     Ok(())
 }
 

@@ -8,6 +8,7 @@ pub(crate) struct Image(u16);
 
 const DIRECT: u16 = 0;
 const LOWER: u16 = 1;
+const UPPER: u16 = 2;
 
 impl Image {
     /// The source itself.
@@ -20,6 +21,32 @@ impl Image {
 
     fn with(self, axis: usize, side: u16) -> Self {
         Self(self.0 | side << (2 * axis))
+    }
+
+    /// This image after its source has gone over to image `source` of its former place, and its target to `target`;
+    /// `None` where it is now farther away than any image that counts. Only periodic axes are ever crossed.
+    #[inline]
+    pub(crate) fn crossed(self, source: Self, target: Self) -> Option<Self> {
+        const STEPS: [i32; 4] = [0, -1, 1, 0];
+        let mut image = Self::OWN;
+        // Eight axes fit the sixteen bits.
+        for axis in 0..8 {
+            let steps = |image: Self| STEPS[usize::from(image.side(axis))];
+            let side = match steps(self) + steps(source) - steps(target) {
+                0 => DIRECT,
+                -1 => LOWER,
+                1 => UPPER,
+                _ => return None,
+            };
+            image = image.with(axis, side);
+        }
+        Some(image)
+    }
+
+    /// Whether this is the image by a translation along every axis, such as the source itself.
+    #[inline]
+    pub(crate) fn is_shift<const D: usize>(self, domain: &Domain<D>) -> bool {
+        (0..D).all(|axis| self.side(axis) == DIRECT || domain.faces[axis][0] == Face::Periodic)
     }
 }
 
@@ -88,6 +115,24 @@ impl<const D: usize> Domain<D> {
         })
     }
 
+    /// The shortest way from one point of the box to another, and the image of the second it leads to.
+    #[inline]
+    pub(crate) fn displacement(&self, from: &[f64; D], to: &[f64; D]) -> ([f64; D], Image) {
+        let (mut way, mut image) = ([0.0; D], Image::OWN);
+        for axis in 0..D {
+            way[axis] = to[axis] - from[axis];
+            if self.faces[axis][0] == Face::Periodic {
+                let width = self.upper[axis] - self.lower[axis];
+                if way[axis] > 0.5 * width {
+                    (way[axis], image) = (way[axis] - width, image.with(axis, LOWER));
+                } else if way[axis] < -0.5 * width {
+                    (way[axis], image) = (way[axis] + width, image.with(axis, UPPER));
+                }
+            }
+        }
+        (way, image)
+    }
+
     /// -1 behind an odd number of odd mirrors, otherwise +1.
     #[inline]
     pub(crate) fn sign(&self, image: Image) -> i8 {
@@ -108,6 +153,11 @@ impl<const D: usize> Domain<D> {
                 if upper { self.upper[axis] - reach } else { f64::INFINITY },
             ]
         })
+    }
+
+    /// Whether a particle can cross a face and come back behind another.
+    pub(crate) fn has_shifts(&self) -> bool {
+        self.faces.iter().any(|faces| faces[0] == Face::Periodic)
     }
 
     /// A bound on the magnitude of every face that casts images, zero for open space.

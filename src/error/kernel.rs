@@ -40,11 +40,13 @@ kinds! {
         } => "the anisotropic Gaussian serves second derivatives, not degree {degree}",
         /// A derivative of higher degree than the kernel has.
         Regularity {
+            /// The kernel, by the name of its type.
+            kernel: &'static str,
             /// Degree asked for.
             degree: u32,
             /// Highest degree the kernel is differentiable to.
             limit: u32,
-        } => "the kernel has derivatives to degree {limit}, not {degree}",
+        } => "{kernel} has derivatives to degree {limit}, not {degree}",
         /// A support radius or overlap limit that is not positive and finite, or whose square or volume is not.
         Radii {
             /// Support, in units of epsilon.
@@ -52,6 +54,20 @@ kinds! {
             /// Largest h / epsilon.
             overlap_limit: f64,
         } => "support {support} and overlap limit {overlap_limit} must be positive and finite, the volume within too",
+        /// A remeshing kernel Lambda_{P,R} that does not exist.
+        Lambda {
+            /// P, the degree it should reproduce.
+            exactness: u64,
+            /// R, how often it should be differentiable.
+            regularity: u64,
+        } => "Lambda_{exactness},{regularity} does not exist: P must be even and from 2 to 2 R + 1",
+        /// The exact derivation of Lambda_{P,R} left the range of 128-bit integers.
+        LambdaOverflow {
+            /// P.
+            exactness: u64,
+            /// R.
+            regularity: u64,
+        } => "Lambda_{exactness},{regularity} does not fit 128-bit rationals",
         /// A quadrature of too many points.
         Points {
             /// Number of points.

@@ -5,6 +5,7 @@ mod boundary;
 mod domain;
 mod kernel;
 mod linear;
+mod mesh;
 mod multi_index;
 mod neighbor;
 mod operator;
@@ -17,6 +18,7 @@ pub use boundary::BoundaryError;
 pub use domain::DomainError;
 pub use kernel::KernelError;
 pub use linear::LinearError;
+pub use mesh::MeshError;
 pub use multi_index::MultiIndexError;
 pub use neighbor::NeighborError;
 pub use operator::OperatorError;
@@ -127,6 +129,7 @@ impl fmt::Display for ErrorKind {
             ErrorKind::Neighbor(kind) => kind.fmt(f),
             ErrorKind::Operator(kind) => kind.fmt(f),
             ErrorKind::Apply(kind) => kind.fmt(f),
+            ErrorKind::Mesh(kind) => kind.fmt(f),
             ErrorKind::Linear(kind) => kind.fmt(f),
             ErrorKind::Boundary(kind) => kind.fmt(f),
             ErrorKind::Time(kind) => kind.fmt(f),
@@ -156,6 +159,8 @@ pub enum ErrorKind {
     Operator(OperatorError),
     /// Applying rows to fields.
     Apply(ApplyError),
+    /// Meshes, and what goes between them and particles.
+    Mesh(MeshError),
     /// Sparse matrices and linear solves.
     Linear(LinearError),
     /// Boundary conditions.
@@ -194,6 +199,7 @@ from_kind! {
     Neighbor: NeighborError,
     Operator: OperatorError,
     Apply: ApplyError,
+    Mesh: MeshError,
     Linear: LinearError,
     Boundary: BoundaryError,
     Time: TimeError,

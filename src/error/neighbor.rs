@@ -19,6 +19,30 @@ kinds! {
             /// Largest legal value.
             high: f64,
         } => "cutoff {cutoff:e} is outside {low:e} to {high:e}",
+        /// Points that the package of the feature `kiddo` makes no tree of.
+        Tree {
+            /// Points and images.
+            entries: usize,
+        } => "no k-d tree could be made of {entries} points and images",
+        /// A skin that is negative or not finite.
+        Skin {
+            /// The skin.
+            skin: f64,
+        } => "skin {skin} is not a finite number from 0 on",
+        /// A list that answers for another generation of the particles.
+        Stale {
+            /// Generation the list answers for.
+            list: u64,
+            /// Generation of the set.
+            set: u64,
+        } => "the list answers for generation {list} of the particles, not for {set}",
+        /// A target that is not the particle of its own number, where every target must be one.
+        NotParticle {
+            /// The source that is the target; the number of sources where it is none.
+            center: usize,
+            /// Number of sources.
+            sources: usize,
+        } => "the target is source {center} of {sources}, not the one of its own number",
         /// A target without neighbors, where their mean distance is needed.
         Isolated {
             /// The cutoff.

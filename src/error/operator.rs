@@ -153,5 +153,12 @@ kinds! {
             /// The value.
             value: f64,
         } => "setting {value} is not a positive number",
+        /// A kernel that is neither even nor odd as its degree demands, where one value serves both partners of a pair.
+        Parity {
+            /// eta(z).
+            value: f64,
+            /// eta(-z).
+            opposite: f64,
+        } => "the kernel is {value:e} at one particle and {opposite:e} at its partner: it has not the parity of its degree",
     }
 }

@@ -1,7 +1,9 @@
 //! Exchange kernels eta^beta of any multi-index, and of sums of one degree, derived exactly.
 
+use std::array;
 use std::collections::BTreeSet;
 
+use super::decay::{decay, in_lanes};
 use super::derivation::{harmonics, radial};
 use super::harmonic::Harmonic;
 use super::polynomial::ExactPolynomial;
@@ -9,7 +11,7 @@ use super::rational::Rational;
 use super::{Kernel, gaussian_constant};
 use crate::error::{Error, KernelError, Result};
 use crate::multi_index::{MultiIndex, Term, common_degree};
-use crate::scalar::{Scalar, square};
+use crate::scalar::Scalar;
 
 /// The exchange kernel eta(z) = pi^(-D/2) P(z) exp(-|z|^2) of L = sum_i c_i D^beta_i, all of one degree m, to order
 /// r = 2, 4, 6 or 8.
@@ -146,6 +148,20 @@ impl<const D: usize> Exchange<D> {
         moment.ok_or_else(|| KernelError::Overflow { degree: self.degree, order: self.order }.into())
     }
 
+    /// eta at L points.
+    #[inline(always)]
+    fn at<T: Scalar, const L: usize>(&self, z: &[[T; D]; L]) -> [T; L] {
+        let (s, decay) = decay(z, 1.0);
+        let mut sum = [T::zero(); L];
+        for piece in &self.pieces {
+            let radial = horner_lanes(&piece.radial, &s);
+            for i in 0..L {
+                sum[i] += piece.harmonic.value(&z[i]) * radial[i];
+            }
+        }
+        array::from_fn(|i| sum[i] * decay[i])
+    }
+
     /// The coefficients of P in |z|^2, with pi^(-D/2), where P is radial.
     pub(super) fn radial(&self) -> Option<&[f64]> {
         match self.pieces.as_slice() {
@@ -193,35 +209,41 @@ impl<const D: usize> Piece<D> {
     }
 }
 
+/// exp(-|z|^2) sum_k c_k |z|^2k.
+#[inline(always)]
+pub(super) fn radial_profile<T: Scalar, const D: usize, const L: usize>(radial: &[f64], z: &[[T; D]; L]) -> [T; L] {
+    let (s, decay) = decay(z, 1.0);
+    let polynomial = horner_lanes(radial, &s);
+    array::from_fn(|i| polynomial[i] * decay[i])
+}
+
 /// sum_k c_k s^k.
 #[inline(always)]
 pub(super) fn horner<T: Scalar>(coefficients: &[f64], s: T) -> T {
+    let [sum] = horner_lanes(coefficients, &[s]);
+    sum
+}
+
+/// sum_k c_k s^k for several s side by side.
+#[inline(always)]
+fn horner_lanes<T: Scalar, const L: usize>(coefficients: &[f64], s: &[T; L]) -> [T; L] {
     // Begun with the last coefficient, a constant stays one where s overflows.
-    let Some((&last, others)) = coefficients.split_last() else { return T::zero() };
-    others.iter().rev().fold(T::lift(last), |sum, &c| sum * s + T::lift(c))
+    let Some((&last, others)) = coefficients.split_last() else { return [T::zero(); L] };
+    others.iter().rev().fold([T::lift(last); L], |sum, &c| array::from_fn(|i| sum[i] * s[i] + T::lift(c)))
 }
 
 impl<T: Scalar, const D: usize> Kernel<T, D> for Exchange<D> {
     #[inline]
     fn value(&self, z: &[T; D]) -> T {
-        let s = square(z);
-        let mut sum = T::zero();
-        for piece in &self.pieces {
-            sum += piece.harmonic.value(z) * horner(&piece.radial, s);
-        }
-        sum * (-s).exp()
+        let [value] = self.at(&[*z]);
+        value
     }
 
     fn values(&self, z: &[[T; D]], out: &mut [T]) {
         if let Some(radial) = self.radial() {
-            for (z, out) in z.iter().zip(out) {
-                let s = square(z);
-                *out = horner(radial, s) * (-s).exp();
-            }
+            in_lanes(z, out, |z| radial_profile(radial, z));
         } else {
-            for (z, out) in z.iter().zip(out) {
-                *out = self.value(z);
-            }
+            in_lanes(z, out, |z| self.at(z));
         }
     }
 

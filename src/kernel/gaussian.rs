@@ -2,10 +2,11 @@
 
 use std::f64::consts::{PI, SQRT_2};
 
-use super::{Kernel, SmoothingKernel, gaussian_constant};
+use super::decay::{decay, in_lanes};
+use super::{Kernel, SmoothingKernel, gaussian_constant, laplacian};
 use crate::error::Result;
 use crate::multi_index::{MultiIndex, Term};
-use crate::scalar::{Scalar, square};
+use crate::scalar::Scalar;
 
 /// The Gaussian smoothing kernel W(z) = (2 pi)^(-D/2) exp(-|z|^2/2), of order 2.
 ///
@@ -48,7 +49,12 @@ impl<const D: usize> Default for Gaussian<D> {
 impl<T: Scalar, const D: usize> Kernel<T, D> for Gaussian<D> {
     #[inline]
     fn value(&self, z: &[T; D]) -> T {
-        (square(z) * T::lift(-0.5)).exp() * T::lift(self.constant)
+        let [value] = profile(&[*z], 0.5, self.constant);
+        value
+    }
+
+    fn values(&self, z: &[[T; D]], out: &mut [T]) {
+        in_lanes(z, out, |z| profile(z, 0.5, self.constant));
     }
 
     fn terms(&self) -> &[Term<D>] {
@@ -84,8 +90,9 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for Gaussian<D> {
     }
 
     fn combination(&self, terms: &[Term<D>], z: &[[T; D]], out: &mut [T]) -> Result<()> {
+        self.values(z, out);
         for (z, out) in z.iter().zip(out) {
-            let value = self.value(z);
+            let value = *out;
             *out = T::zero();
             for term in terms {
                 let mut product = value;
@@ -108,6 +115,12 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for Gaussian<D> {
     fn normalization(&self) -> f64 {
         self.constant
     }
+}
+
+/// c exp(-a |z|^2).
+#[inline(always)]
+fn profile<T: Scalar, const D: usize, const L: usize>(z: &[[T; D]; L], a: f64, constant: f64) -> [T; L] {
+    decay(z, a).1.map(|value| value * T::lift(constant))
 }
 
 /// (-1)^n He_n(x), by g_(n+1) = -x g_n - n g_(n-1).
@@ -144,12 +157,7 @@ pub struct WideGaussian<const D: usize> {
 impl<const D: usize> WideGaussian<D> {
     /// The kernel.
     pub fn new() -> Self {
-        let second = |axis| {
-            let mut exponents = [0; D];
-            exponents[axis] = 2;
-            Term { index: MultiIndex::new(exponents), factor: 1.0 }
-        };
-        Self { terms: std::array::from_fn(second), constant: gaussian_constant::<D>(4.0 * PI) }
+        Self { terms: laplacian(), constant: gaussian_constant::<D>(4.0 * PI) }
     }
 }
 
@@ -162,7 +170,12 @@ impl<const D: usize> Default for WideGaussian<D> {
 impl<T: Scalar, const D: usize> Kernel<T, D> for WideGaussian<D> {
     #[inline]
     fn value(&self, z: &[T; D]) -> T {
-        (square(z) * T::lift(-0.25)).exp() * T::lift(self.constant)
+        let [value] = profile(&[*z], 0.25, self.constant);
+        value
+    }
+
+    fn values(&self, z: &[[T; D]], out: &mut [T]) {
+        in_lanes(z, out, |z| profile(z, 0.25, self.constant));
     }
 
     fn terms(&self) -> &[Term<D>] {

@@ -1,7 +1,8 @@
 //! Smoothing kernels of order above 2: the identity kernels, a polynomial times exp(-|z|^2).
 
-use super::exchange::{Exchange, horner};
-use super::{Kernel, SmoothingKernel};
+use super::decay::{damp, decay, in_lanes};
+use super::exchange::{Exchange, horner, radial_profile};
+use super::{Kernel, SmoothingKernel, gaussian_constant};
 use crate::error::{KernelError, Result};
 use crate::multi_index::{MultiIndex, Term};
 use crate::scalar::{Scalar, square};
@@ -75,8 +76,13 @@ impl<const D: usize> HighOrderGaussian<D> {
 impl<T: Scalar, const D: usize> Kernel<T, D> for HighOrderGaussian<D> {
     #[inline]
     fn value(&self, z: &[T; D]) -> T {
-        let s = square(z);
-        horner(&self.profiles[0], s) * (-s).exp()
+        let [value] = radial_profile(&self.profiles[0][..self.coefficients], &[*z]);
+        value
+    }
+
+    fn values(&self, z: &[[T; D]], out: &mut [T]) {
+        let radial = &self.profiles[0][..self.coefficients];
+        in_lanes(z, out, |z| radial_profile(radial, z));
     }
 
     fn terms(&self) -> &[Term<D>] {
@@ -116,7 +122,12 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for HighOrderGaussian<D> {
         for &Term { index, factor } in terms {
             let degree = index.degree();
             if degree > Self::DERIVATIVE_LIMIT {
-                return Err(KernelError::Regularity { degree, limit: Self::DERIVATIVE_LIMIT }.into());
+                return Err(KernelError::Regularity {
+                    kernel: "HighOrderGaussian",
+                    degree,
+                    limit: Self::DERIVATIVE_LIMIT,
+                }
+                .into());
             }
             for_each_half(index, |halves, taken| {
                 let radial = self.differentiated(degree - taken);
@@ -133,26 +144,24 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for HighOrderGaussian<D> {
                 }
             });
         }
-        for (z, out) in z.iter().zip(out) {
-            *out *= (-square(z)).exp();
-        }
+        damp(z, out);
         Ok(())
     }
 
     fn gradient(&self, z: &[T; D]) -> Result<[T; D]> {
-        let s = square(z);
-        let slope = (horner(&self.profiles[1], s) - horner(&self.profiles[0], s)) * T::lift(2.0) * (-s).exp();
+        let ([s], [decay]) = decay(&[*z], 1.0);
+        let slope = (horner(&self.profiles[1], s) - horner(&self.profiles[0], s)) * T::lift(2.0) * decay;
         Ok(z.map(|x| x * slope))
     }
 
     fn normalization(&self) -> f64 {
-        super::gaussian_constant::<D>(std::f64::consts::PI)
+        gaussian_constant::<D>(std::f64::consts::PI)
     }
 }
 
 /// Calls `visit(k, |k|)` for all k with 2k <= beta.
 #[inline]
-fn for_each_half<const D: usize>(beta: MultiIndex<D>, mut visit: impl FnMut(&[u8; D], u32)) {
+pub(super) fn for_each_half<const D: usize>(beta: MultiIndex<D>, mut visit: impl FnMut(&[u8; D], u32)) {
     let exponents = beta.exponents();
     let mut halves = [0_u8; D];
     loop {
@@ -167,7 +176,7 @@ fn for_each_half<const D: usize>(beta: MultiIndex<D>, mut visit: impl FnMut(&[u8
 
 /// 2^(n - 2k) n! / (k! (n - 2k)!).
 #[inline]
-fn constant(n: u8, k: u8) -> f64 {
+pub(super) fn constant(n: u8, k: u8) -> f64 {
     let (n, k) = (u32::from(n), u32::from(k));
     let mut factor = 1.0;
     for i in 0..k {

@@ -1,24 +1,42 @@
-//! Kernels: smoothing W, exchange eta^beta. A kernel is unscaled (epsilon = 1); methods scale it.
+//! Kernels: smoothing W, exchange eta^beta, mesh kernels. A kernel is unscaled (epsilon = 1, or the spacing of the mesh);
+//! methods and meshes scale it.
 
 mod anisotropic;
+mod assignment;
+mod compact;
+mod decay;
 mod derivation;
 mod exchange;
 mod gaussian;
 mod harmonic;
 mod high_order;
+mod interpolation;
+mod lambda;
+mod lattice_hat;
+mod mesh_kernel;
 mod one_sided;
 mod polynomial;
 mod rational;
+mod rational_laplacian;
+mod spline;
 mod twofold;
+mod wendland;
 
 pub use anisotropic::AnisotropicGaussian;
+pub use assignment::{Cic, Ngp, Tsc};
 pub use exchange::Exchange;
 pub use gaussian::{Gaussian, WideGaussian};
 pub use high_order::HighOrderGaussian;
+pub use lambda::Lambda;
+pub use lattice_hat::LatticeHat;
+pub use mesh_kernel::MeshKernel;
 pub use one_sided::OneSidedGaussian;
 pub(crate) use one_sided::along_axis;
 pub use polynomial::ExactPolynomial;
 pub use rational::Rational;
+pub use rational_laplacian::RationalLaplacian;
+pub use spline::{CubicSpline, QuinticSpline};
+pub use wendland::{WendlandC2, WendlandC4, WendlandC6};
 
 use crate::error::Result;
 use crate::multi_index::{MultiIndex, Term};
@@ -135,7 +153,25 @@ pub trait SmoothingKernel<T: Scalar, const D: usize>: Kernel<T, D> {
     fn normalization(&self) -> f64;
 }
 
-/// a^(-D/2), for the constant in front of a Gaussian.
+/// The terms of the Laplacian, sum_i D^2_i.
+fn laplacian<const D: usize>() -> [Term<D>; D] {
+    std::array::from_fn(|axis| {
+        let mut exponents = [0; D];
+        exponents[axis] = 2;
+        Term { index: MultiIndex::new(exponents), factor: 1.0 }
+    })
+}
+
+/// a^(-D/2), rounded about once, for the constant in front of a Gaussian.
 fn gaussian_constant<const D: usize>(a: f64) -> f64 {
-    (0..D).fold(1.0, |product, _| product / a.sqrt())
+    let root = a.sqrt().recip();
+    let square = root * root;
+    // What the root and its square lack, so that the roundings do not add up over the product.
+    let lost = root.mul_add(root, -square);
+    let rest = 0.5 * root * ((-a).mul_add(square, 1.0) - a * lost);
+    let (high, low) = (0..D).fold((1.0, 0.0), |(high, low): (f64, f64), _| {
+        let product = high * root;
+        (product, high.mul_add(root, -product) + (high * rest + low * root))
+    });
+    high + low
 }

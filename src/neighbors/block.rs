@@ -5,6 +5,9 @@ use crate::error::Result;
 use crate::particles::reserved;
 use crate::stencil::Neighbor;
 
+/// Targets in a block.
+pub(super) const ROWS: usize = 4096;
+
 /// Consecutive rows. Lists are made of blocks, so that none of their memory is ever moved or allocated twice.
 #[derive(Clone, Debug)]
 pub(super) struct Block<const D: usize> {
@@ -15,9 +18,6 @@ pub(super) struct Block<const D: usize> {
 }
 
 impl<const D: usize> Block<D> {
-    /// Targets in a block.
-    pub(super) const ROWS: usize = 4096;
-
     pub(super) fn empty() -> Self {
         Self { ends: Vec::new(), neighbors: Vec::new(), separations: Vec::new(), signs: Vec::new() }
     }

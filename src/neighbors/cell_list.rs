@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::grid::Grid;
+use super::links::Links;
 use super::placed::{Placed, distance_squared, within};
 use super::table::{Table, is_dense};
 use super::{NeighborList, Neighbors};
@@ -108,6 +109,19 @@ impl<const D: usize> CellList<D> {
     pub(super) fn order(&self) -> impl Iterator<Item = usize> + '_ {
         let own = self.sources.iter().zip(&self.images).filter(|&(_, &image)| image == Image::OWN);
         own.map(|(&source, _)| source as usize)
+    }
+
+    /// All rows up to the reach as indices.
+    pub(super) fn links(&self) -> Result<Vec<Links>> {
+        Links::rows(self.targets(), |p, links| {
+            self.scan(p, self.placed.cutoff, |_, slots, images| {
+                if images {
+                    slots.iter().for_each(|&slot| links.push(self.sources[slot as usize], self.images[slot as usize]));
+                } else {
+                    links.extend(slots.iter().map(|&slot| self.sources[slot as usize]));
+                }
+            });
+        })
     }
 
     /// Calls `found` with the slots of all neighbors of p, some at a time; tells it whether images may be among them.
@@ -250,15 +264,15 @@ fn keep(slots: &mut [u32], pass: impl Fn(&u32) -> bool) -> &[u32] {
 }
 
 /// A bound on every coordinate that enters: targets, sources, faces.
-fn magnitude<const D: usize>(placed: &Placed<D>) -> f64 {
+pub(super) fn magnitude<const D: usize>(placed: &Placed<D>) -> f64 {
     let points = placed.sources.iter().chain(placed.targets());
     points.flatten().fold(placed.domain.magnitude(), |high, x| x.abs().max(high))
 }
 
-type Ghosts<const D: usize> = (Vec<[f64; D]>, Vec<(u32, Image)>);
+pub(super) type Ghosts<const D: usize> = (Vec<[f64; D]>, Vec<(u32, Image)>);
 
 /// The images of all sources within `reach` of the box, where they lie and whose they are.
-fn ghosts<const D: usize>(placed: &Placed<D>, reach: f64) -> Result<Ghosts<D>> {
+pub(super) fn ghosts<const D: usize>(placed: &Placed<D>, reach: f64) -> Result<Ghosts<D>> {
     let (mut positions, mut origins) = (Vec::new(), Vec::new());
     for (source, point) in (0..).zip(&placed.sources) {
         placed.domain.for_images(point, reach, |image| {
@@ -350,14 +364,6 @@ impl<const D: usize> Neighbors<D> for CellList<D> {
     }
 
     fn stored(&self) -> Result<NeighborList<D>> {
-        NeighborList::linked(&self.placed, |p, links| {
-            self.scan(p, self.placed.cutoff, |_, slots, images| {
-                if images {
-                    slots.iter().for_each(|&slot| links.push(self.sources[slot as usize], self.images[slot as usize]));
-                } else {
-                    links.extend(slots.iter().map(|&slot| self.sources[slot as usize]));
-                }
-            });
-        })
+        NeighborList::linked(&self.placed, self.links()?)
     }
 }

@@ -1,12 +1,13 @@
 //! Rows of a few thousand targets as indices: separations are measured again when they are asked for.
 
-use super::block::{Block, exact};
+use super::block::{ROWS, exact};
 use super::placed::{Placed, difference, distance_squared, within};
 use crate::domain::Image;
 use crate::error::Result;
+use crate::particles::reserved;
 use crate::stencil::{Neighbor, Stencil};
 
-/// Consecutive rows of sources and images, as many as in a [`Block`].
+/// Consecutive rows of sources and images, [`ROWS`] of them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Links {
     ends: Vec<usize>,
@@ -16,6 +17,20 @@ pub(super) struct Links {
 }
 
 impl Links {
+    /// Rows of indices, block after block; `fill(p, links)` adds the neighbors of p.
+    pub(super) fn rows(targets: usize, mut fill: impl FnMut(usize, &mut Self)) -> Result<Vec<Self>> {
+        let mut blocks = reserved(targets.div_ceil(ROWS))?;
+        let mut links = Self::default();
+        for p in 0..targets {
+            fill(p, &mut links);
+            links.end_row();
+            if p + 1 == targets || (p + 1).is_multiple_of(ROWS) {
+                blocks.push(links.pack()?);
+            }
+        }
+        Ok(blocks)
+    }
+
     /// Adds sources that are no images.
     #[inline(always)]
     pub(super) fn extend(&mut self, sources: impl Iterator<Item = u32>) {
@@ -36,7 +51,7 @@ impl Links {
         }
     }
 
-    pub(super) fn end_row(&mut self) {
+    fn end_row(&mut self) {
         self.ends.push(self.sources.len());
     }
 
@@ -45,7 +60,7 @@ impl Links {
     }
 
     /// A copy without spare room; the links themselves are emptied and keep their memory.
-    pub(super) fn pack(&mut self) -> Result<Self> {
+    fn pack(&mut self) -> Result<Self> {
         let packed = Self { ends: exact(&self.ends)?, sources: exact(&self.sources)?, images: exact(&self.images)? };
         self.ends.clear();
         self.sources.clear();
@@ -55,7 +70,7 @@ impl Links {
 
     /// Sources and images of one row; no images where all are the sources themselves.
     #[inline(always)]
-    fn row(&self, row: usize) -> (&[u32], &[Image]) {
+    pub(super) fn row(&self, row: usize) -> (&[u32], &[Image]) {
         let past = self.ends.get(row).copied().unwrap_or(0);
         let first = if row == 0 || past == 0 { 0 } else { self.ends[row - 1] };
         let images = self.images.get(first..past).unwrap_or(&[]);
@@ -75,7 +90,7 @@ impl Links {
     ) {
         let Some(target) = placed.targets().get(p) else { return };
         let limit = within(cutoff);
-        let (sources, images) = self.row(p % Block::<D>::ROWS);
+        let (sources, images) = self.row(p % ROWS);
         for (i, &q) in sources.iter().enumerate() {
             let image = images.get(i).copied().unwrap_or(Image::OWN);
             let neighbor = placed.neighbor(image, target, q);
@@ -96,7 +111,7 @@ impl Links {
         row: &mut Stencil<D>,
     ) {
         let Some(target) = placed.targets().get(p) else { return };
-        let (sources, images) = self.row(p % Block::<D>::ROWS);
+        let (sources, images) = self.row(p % ROWS);
         if !images.is_empty() {
             return self.visit(placed, p, cutoff, whole, |neighbor| row.push(neighbor));
         }

@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use super::Neighbors;
-use super::block::Block;
+use super::block::{Block, ROWS};
 use super::links::Links;
 use super::placed::{Placed, check_cutoff, distance_squared};
 use super::row_check::{check_offsets, check_row};
+use super::rows::Rows;
 use crate::domain::{Domain, Image};
 use crate::error::{Error, NeighborError, Result};
 use crate::particles::{PARTICLES_HIGH, Particles, check_count, reserved};
@@ -39,12 +40,7 @@ pub struct NeighborList<const D: usize> {
     rows: Rows<D>,
 }
 
-#[derive(Clone, Debug)]
-enum Rows<const D: usize> {
-    Measured(Vec<Block<D>>),
-    Linked(Arc<Placed<D>>, Vec<Links>),
-}
-
+/// A target that is no particle.
 const NONE: u32 = u32::MAX;
 
 impl<const D: usize> NeighborList<D> {
@@ -61,7 +57,7 @@ impl<const D: usize> NeighborList<D> {
         let (targets, reach) = (provider.targets(), provider.reach());
         let mut list = Self::with_room(targets, provider.sources(), reach, provider.generation())?;
         list.owned = provider.owned();
-        let mut blocks = reserved(targets.div_ceil(Block::<D>::ROWS))?;
+        let mut blocks = reserved(targets.div_ceil(ROWS))?;
         let mut block = Block::empty();
         for p in 0..targets {
             provider.for_each(p, reach, |neighbor| block.push(neighbor));
@@ -70,24 +66,18 @@ impl<const D: usize> NeighborList<D> {
                 blocks.push(block.pack()?);
             }
         }
-        list.rows = Rows::Measured(blocks);
+        list.rows = Rows::Measured(Arc::new(blocks));
         Ok(list)
     }
 
-    /// Rows of indices over these points; `fill(p, links)` adds the neighbors of p up to the cutoff.
-    pub(super) fn linked(placed: &Arc<Placed<D>>, mut fill: impl FnMut(usize, &mut Links)) -> Result<Self> {
+    /// These rows of indices over these points, up to their cutoff.
+    pub(super) fn linked(placed: &Arc<Placed<D>>, links: Vec<Links>) -> Result<Self> {
         let targets = placed.targets().len();
         let mut list = Self::with_room(targets, placed.sources.len(), placed.cutoff, placed.generation)?;
-        let mut blocks = reserved(targets.div_ceil(Block::<D>::ROWS))?;
-        let mut links = Links::default();
         for p in 0..targets {
-            fill(p, &mut links);
-            links.end_row();
-            if list.end_row(targets, placed.center(p), placed.cutoff) {
-                blocks.push(links.pack()?);
-            }
+            list.end_row(targets, placed.center(p), placed.cutoff);
         }
-        list.rows = Rows::Linked(Arc::clone(placed), blocks);
+        list.rows = Rows::Linked(Arc::clone(placed), Arc::new(links));
         Ok(list)
     }
 
@@ -119,7 +109,7 @@ impl<const D: usize> NeighborList<D> {
         check_cutoff(cutoff)?;
         check_offsets(offsets, centers.len(), neighbors.len())?;
         let mut list = Self::with_room(centers.len(), sources, cutoff.0, generation)?;
-        let mut blocks = reserved(centers.len().div_ceil(Block::<D>::ROWS))?;
+        let mut blocks = reserved(centers.len().div_ceil(ROWS))?;
         let mut block = Block::empty();
         for (p, &center) in centers.iter().enumerate() {
             let row = &neighbors[offsets[p]..offsets[p + 1]];
@@ -133,7 +123,7 @@ impl<const D: usize> NeighborList<D> {
                 blocks.push(block.pack()?);
             }
         }
-        list.rows = Rows::Measured(blocks);
+        list.rows = Rows::Measured(Arc::new(blocks));
         Ok(list)
     }
 
@@ -177,18 +167,19 @@ impl<const D: usize> NeighborList<D> {
         Self::from_rows(particles.len(), &centers, offsets, &neighbors, cutoff, particles.generation())
     }
 
+    pub(super) fn into_rows(self) -> Rows<D> {
+        self.rows
+    }
+
     /// How many neighbors all rows hold together.
     pub fn total(&self) -> usize {
-        match &self.rows {
-            Rows::Measured(blocks) => blocks.iter().map(Block::total).sum(),
-            Rows::Linked(_, blocks) => blocks.iter().map(Links::total).sum(),
-        }
+        self.rows.total()
     }
 
     fn with_room(targets: usize, sources: usize, reach: f64, generation: u64) -> Result<Self> {
         check_count(sources, PARTICLES_HIGH)?;
         let (centers, cutoffs) = (reserved(targets)?, reserved(targets)?);
-        Ok(Self { sources, owned: sources, centers, cutoffs, reach, generation, rows: Rows::Measured(Vec::new()) })
+        Ok(Self { sources, owned: sources, centers, cutoffs, reach, generation, rows: Rows::Measured(Arc::default()) })
     }
 
     /// Notes center and cutoff of the next target; whether a block of rows ends here.
@@ -196,7 +187,7 @@ impl<const D: usize> NeighborList<D> {
         self.centers.push(center.map_or(NONE, |q| q as u32));
         self.cutoffs.push(cutoff);
         let rows = self.centers.len();
-        rows == targets || rows.is_multiple_of(Block::<D>::ROWS)
+        rows == targets || rows.is_multiple_of(ROWS)
     }
 }
 
@@ -229,29 +220,16 @@ impl<const D: usize> Neighbors<D> for NeighborList<D> {
         self.generation
     }
 
-    fn for_each(&self, p: usize, cutoff: f64, mut visit: impl FnMut(Neighbor<D>)) {
-        let (block, row) = (p / Block::<D>::ROWS, p % Block::<D>::ROWS);
-        let whole = cutoff >= self.reach;
-        match &self.rows {
-            _ if !(cutoff >= 0.0) => {}
-            Rows::Measured(blocks) => {
-                blocks.get(block).into_iter().for_each(|block| block.row(row, cutoff, whole).for_each(&mut visit));
-            }
-            Rows::Linked(placed, blocks) => {
-                blocks.get(block).into_iter().for_each(|links| links.visit(placed, p, cutoff, whole, &mut visit));
-            }
-        }
+    fn for_each(&self, p: usize, cutoff: f64, visit: impl FnMut(Neighbor<D>)) {
+        self.rows.visit(p, cutoff, cutoff >= self.reach, visit);
     }
 
     fn gather(&self, p: usize, cutoff: f64, row: &mut Stencil<D>) {
         row.reset(p, self.center(p), cutoff);
-        match &self.rows {
-            Rows::Linked(placed, blocks) if cutoff >= 0.0 => {
-                if let Some(links) = blocks.get(p / Block::<D>::ROWS) {
-                    links.gather(placed, p, cutoff, cutoff >= self.reach, row);
-                }
-            }
-            _ => self.for_each(p, cutoff, |neighbor| row.push(neighbor)),
-        }
+        self.rows.gather(p, cutoff, cutoff >= self.reach, row);
+    }
+
+    fn stored(&self) -> Result<Self> {
+        Ok(self.clone())
     }
 }

@@ -4,26 +4,38 @@ mod block;
 mod brute_force;
 mod canonical;
 mod cell_list;
+mod colored;
 mod grid;
+mod half;
 mod links;
 mod list;
 mod measure;
 mod nearest;
 mod order;
+mod pair;
 mod placed;
 mod row_check;
+mod rows;
 mod selected;
 mod table;
+#[cfg(feature = "kiddo")]
+mod tree;
 mod upstream;
+mod verlet;
 
 pub use brute_force::BruteForce;
 pub use canonical::Canonical;
 pub use cell_list::CellList;
+pub use half::HalfList;
 pub use list::NeighborList;
 pub use measure::{epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors};
 pub use nearest::Nearest;
+pub use pair::{Pair, Symmetry};
 pub use selected::Selected;
+#[cfg(feature = "kiddo")]
+pub use tree::KdTree;
 pub use upstream::Upstream;
+pub use verlet::VerletList;
 
 use crate::error::Result;
 use crate::stencil::{Neighbor, Stencil};

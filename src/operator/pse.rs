@@ -62,7 +62,7 @@ pub enum Form {
 /// Source: notes 001, eq. 5.30 and 5.31, with errata 10 to 13; notes 000, eq. 26. See also: [`Sph`](super::Sph), which
 /// differentiates one smoothing kernel.
 #[derive(Clone, Debug)]
-pub struct Pse<K, const N: usize = 1>(Pairwise<K, N>);
+pub struct Pse<K, const N: usize = 1>(pub(super) Pairwise<K, N>);
 
 impl<const D: usize, const N: usize> Pse<Exchange<D>, N> {
     /// PSE of `order` 2, 4, 6 or 8 with the kernels derived from the moment conditions of `operator`.

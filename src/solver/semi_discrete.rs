@@ -13,7 +13,7 @@ use crate::error::{Result, TimeError};
 use crate::linear::CsrMatrix;
 use crate::neighbors::Neighbors;
 use crate::particles::{Particles, Random};
-use crate::time::Symmetry;
+use crate::time::RowSymmetry;
 
 /// A scene on a particle set: its rows, made once, and du/dt at any time. Absent terms take no room in it.
 ///
@@ -244,7 +244,7 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
 
     /// Whether V_p w_pq = V_q w_qp in the rows of the diffusion term, found by applying them to two fields; a boundary
     /// breaks it. Without a diffusion term there is nothing to break.
-    pub fn symmetry(&self) -> Symmetry {
+    pub fn symmetry(&self) -> RowSymmetry {
         let points = self.site.points();
         let volumes = self.site.particles().volumes().ok();
         let volume = |p: usize| volumes.and_then(|volumes| volumes.get(p).ok()).unwrap_or(1.0);
@@ -269,7 +269,7 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
             size += ab.abs() + ba.abs();
         }
         let tolerance = ROUNDING * S::Value::EPSILON * size;
-        if defect.abs() <= tolerance { Symmetry::Symmetric } else { Symmetry::General }
+        if defect.abs() <= tolerance { RowSymmetry::Symmetric } else { RowSymmetry::General }
     }
 
     /// The largest numerical viscosity of order 1 at time t, in the units of a diffusivity; 0 for schemes of higher order.

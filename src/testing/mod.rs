@@ -3,6 +3,7 @@
 //! Each returns the first promise that is broken, with the numbers.
 
 mod kernel;
+mod mesh_kernel;
 mod method;
 mod method_fault;
 mod provider;
@@ -12,6 +13,7 @@ mod stepper;
 mod stepper_fault;
 
 pub use kernel::{KernelFault, KernelLimits, check_kernel};
+pub use mesh_kernel::{MeshKernelFault, check_mesh_kernel};
 pub use method::{check_method, check_method_moments};
 pub use method_fault::MethodFault;
 pub use provider::{ProviderFault, check_provider, check_provider_against};
