@@ -49,7 +49,7 @@ where
     // Where exp(-z^2/4) is 1e-36.
     const FAR: f64 = 18.0;
     let factorial: f64 = (1..=degree).map(f64::from).product();
-    let own = if degree % 2 == 0 { factorial } else { -factorial };
+    let own = if degree.is_multiple_of(2) { factorial } else { -factorial };
     for n in 1..degree + order {
         let expected = if n == degree { own } else { 0.0 };
         let moment = integral(FAR, |z| z.powi(n as i32) * kernel.value(&[z]));

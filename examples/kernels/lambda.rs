@@ -45,7 +45,7 @@ impl Gallery<'_> {
         self.claims.equal(format!("Lambda {name}: largest miss at the nodes"), interpolation, 0.0, nodes);
         for (degree, curves) in self.curves.iter_mut().enumerate().take(R + 1) {
             let derivative = |s: f64| kernel.derivative(degree as u32, s).unwrap_or(f64::NAN);
-            let miss = reproduction(P, degree, &derivative);
+            let miss = reproduction(P, degree, derivative);
             // Terms k^P Lambda^(m), |k| <= 5, of size 5^P times derivatives up to 10, with some ten roundings.
             let tolerance = 100.0 * 5.0_f64.powi(P as i32) * f64::EPSILON;
             let text = format!("Lambda {name}: largest miss of D^{degree} x^a, a = 0 to {P}");

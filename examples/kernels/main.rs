@@ -8,6 +8,7 @@
 
 mod claim;
 mod exchange;
+#[allow(dead_code, reason = "curves here have no markers but lone circles")]
 #[path = "../figure/mod.rs"]
 mod figure;
 mod lambda;
@@ -37,7 +38,8 @@ fn gallery(options: &Options) -> Result<bool, Box<dyn Error>> {
         ("kernels_exchange_first.svg", exchange::panels(1, points, &mut claims)?),
         ("kernels_exchange_second.svg", exchange::panels(2, points, &mut claims)?),
         ("kernels_exchange_third.svg", exchange::panels(3, points, &mut claims)?),
-        ("kernels_one_sided.svg", one_sided::panels(points, &mut claims)?),
+        ("kernels_one_sided_first.svg", one_sided::panels(1, points, &mut claims)?),
+        ("kernels_one_sided_second.svg", one_sided::panels(2, points, &mut claims)?),
         ("kernels_lambda.svg", lambda::panels(points, &mut claims)?),
         ("kernels_particles.svg", notes::particles(points, &mut claims)),
         ("kernels_hat.svg", notes::hat(&mut claims)),

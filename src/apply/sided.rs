@@ -112,7 +112,8 @@ impl<const D: usize, T: Field> SidedRows<D, T> {
         check_results(out)
     }
 
-    /// A bound on |lambda| of the operator with these velocities, by the row sums (Gershgorin), 1.5 to 3 times above.
+    /// A bound on |lambda| of the operator with these velocities, by the row sums (Gershgorin): up to 4 times the radius where the
+    /// velocity is oblique.
     ///
     /// # Errors
     /// [`ApplyError::Input`] and [`ApplyError::Field`] for velocities of another number, or not finite.

@@ -25,6 +25,7 @@ pub fn eigenvalues(a: &DMatrix<f64>) -> Vec<Complex<f64>> {
 }
 
 /// max Re and max | |.
+#[allow(dead_code)]
 pub fn extremes(a: &DMatrix<f64>) -> (f64, f64) {
     let values = eigenvalues(a);
     let right = values.iter().fold(f64::NEG_INFINITY, |right, z| right.max(z.re));
