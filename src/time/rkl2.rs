@@ -207,7 +207,7 @@ impl<S: State> Stepper<S> for Rkl2<S> {
         2
     }
 
-    fn check_symmetry(&self, symmetry: Symmetry) -> Result<()> {
+    fn check_symmetry(&self, symmetry: RowSymmetry) -> Result<()> {
         self.check_rows(symmetry)
     }
 
