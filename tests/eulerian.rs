@@ -114,7 +114,7 @@ fn amplification<S: Scene<1, Value = f64>>(scene: S, n: usize, stepper: impl Tim
             (re + u * cos, im - u * sin)
         })
     };
-    Ok((0..n).map(|k| mode(k)).map(|(re, im)| re.hypot(im)).fold(0.0, f64::max))
+    Ok((0..n).map(mode).map(|(re, im)| re.hypot(im)).fold(0.0, f64::max))
 }
 
 #[test]
@@ -251,8 +251,8 @@ fn mirrors_hold_values_or_fluxes() -> Result<()> {
     let rod = Particles::lattice([0.0], [1.0], [n])?;
     let laplacian = Pse::new(Laplacian::<1>, 4, rod.spacing()?.epsilon(1.5)?, rod.volumes()?)?;
     let decay = (-d * PI * PI * end).exp();
-    let waves: [(Face, fn(f64) -> f64); 2] = [(Face::MirrorEven, f64::cos), (Face::MirrorOdd, f64::sin)];
-    for (face, wave) in waves {
+    for face in [Face::MirrorEven, Face::MirrorOdd] {
+        let wave = if face == Face::MirrorEven { f64::cos } else { f64::sin };
         let neighbors = CellList::build(&rod, &Domain::new([0.0], [1.0], [[face; 2]])?, laplacian.cutoff())?;
         let scene = AdvectionDiffusion::<1>::new().diffusion(d, laplacian.clone());
         let mut run = Eulerian::new(scene, &rod, &neighbors, Rk4::new())?;

@@ -19,7 +19,9 @@ fn laplacian() -> DcPse<Laplacian<2>, 2> {
     DcPse::new()
 }
 
-fn diffusion(d: f64) -> AdvectionDiffusion<2, f64, (parops::Diffusion<f64, DcPse<Laplacian<2>, 2>>, (), (), ())> {
+type Diffusing = AdvectionDiffusion<2, f64, (parops::Diffusion<f64, DcPse<Laplacian<2>, 2>>, (), (), ())>;
+
+fn diffusion(d: f64) -> Diffusing {
     AdvectionDiffusion::new().diffusion(d, laplacian())
 }
 
