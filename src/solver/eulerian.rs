@@ -266,7 +266,7 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
 
     /// Cuts a step into substeps, each within the limit of its moment, and says how many.
     fn cut(&mut self, u: &mut Vec<S::Value>, dt: f64, mut limits: Limits) -> Result<u32> {
-        let StepPolicy::Adapt { most } = self.steps else { return Ok(0) };
+        let most = if let StepPolicy::Adapt { most } = self.steps { most } else { 0 };
         let (mut t, end, mut done) = (self.t, self.t + dt, 0);
         loop {
             let rest = end - t;
