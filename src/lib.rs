@@ -51,6 +51,7 @@ mod operator;
 mod particles;
 mod scalar;
 mod scale;
+mod solver;
 mod stencil;
 mod time;
 
@@ -84,6 +85,7 @@ pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};
 pub use scalar::Scalar;
 pub use scale::{Cutoff, Epsilon, Spacing, Volumes};
+pub use solver::*;
 pub use stencil::{Neighbor, Side, Stencil};
 pub use time::*;
 

@@ -270,6 +270,39 @@ fn imposing_boundary_conditions_allocates_nothing_after_the_first_time() {
 
 #[cfg(not(feature = "rayon"))]
 #[test]
+fn eulerian_steps_after_the_first_allocate_nothing() -> parops::Result<()> {
+    use parops::{AdvectionDiffusion, Boundary, DcPse, Eulerian, GrowthPolicy, Nearest, StepPolicy};
+    let set = Particles::jittered([0.0; 2], [1.0; 2], [12; 2], 0.2, 3)?.with_equal_volumes(1.0)?;
+    let neighbors = Nearest::build(&set, &Domain::open(), 20)?;
+    let near = |x: &[f64; 2]| x.iter().any(|x| *x < 0.08 || *x > 0.92);
+    let walls: Vec<_> = (0..set.len()).filter(|&p| near(&set.points()[p])).collect();
+    let scene = || {
+        AdvectionDiffusion::<2>::new()
+            .fields::<[f64; 2]>()
+            .diffusion(|x: &[f64; 2]| 0.1 + x[0], DcPse::<Laplacian<2>, 2>::new())
+            .advection(|x: &[f64; 2], t: f64| [x[1], t], DcPse::<Gradient<2>, 2>::new())
+            .computed_divergence()
+            .source(|_, t, u: [f64; 2]| [u[1] - t, -u[0]])
+    };
+    let growth = GrowthPolicy::Allow;
+    let mut free = Eulerian::with_policy(scene(), &set, &neighbors, Rk4::new(), StepPolicy::Refuse, growth)?;
+    let bounded = scene()
+        .boundary(Boundary::new(2).conditions(walls.into_iter().map(BoundaryCondition::dirichlet)), |_, x, t| {
+            [x[0], t]
+        });
+    let adapt = StepPolicy::Adapt { most: 1000 };
+    let mut cut = Eulerian::with_policy(bounded, &set, &neighbors, SspRk3::new(), adapt, growth)?;
+    let mut u = vec![[1.0, -1.0]; set.len()];
+    free.step(&mut u, 1e-4)?;
+    assert_eq!(allocations(|| (0..5).for_each(|_| assert!(free.step(&mut u, 1e-4).is_ok()))), 0);
+    cut.step(&mut u, 0.01)?;
+    assert_eq!(allocations(|| (0..3).for_each(|_| assert!(cut.step(&mut u, 0.01).is_ok()))), 0);
+    assert!(cut.ledger().substeps > 1);
+    Ok(())
+}
+
+#[cfg(not(feature = "rayon"))]
+#[test]
 fn implicit_steps_after_the_first_allocate_nothing() {
     let (particles, domain) = particles();
     let pse = laplacian(&particles);

@@ -9,6 +9,7 @@ mod fields;
 mod histogram;
 mod hyperviscosity;
 mod matrix_free;
+mod pairs;
 mod report;
 mod rows;
 #[cfg(feature = "serde")]

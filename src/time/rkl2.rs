@@ -65,11 +65,15 @@ pub enum RowSymmetry {
 /// at which Y_1 is accurate; substeps are ours.
 /// See also: [`Implicit`](crate::Implicit), where the number of stages would exceed the iterations of a solve.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct Rkl2<S> {
     stages: u32,
     substeps: u32,
     /// The state a substep starts from.
+    #[cfg_attr(feature = "serde", serde(skip))]
     start: Option<S>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     work: Work<S>,
 }
 
@@ -83,6 +87,12 @@ struct Work<S> {
     stage: Option<S>,
 }
 
+impl<S> Default for Work<S> {
+    fn default() -> Self {
+        Self { first: None, rate: None, moved: [None, None], stage: None }
+    }
+}
+
 impl<S> Rkl2<S> {
     /// The scheme with this number of stages s and one substep.
     ///
@@ -92,8 +102,7 @@ impl<S> Rkl2<S> {
         if !(FEWEST..=MOST).contains(&stages) {
             return Err(TimeError::Stages { stages, low: FEWEST, high: MOST }.into());
         }
-        let work = Work { first: None, rate: None, moved: [None, None], stage: None };
-        Ok(Self { stages, substeps: 1, start: None, work })
+        Ok(Self { stages, substeps: 1, start: None, work: Work::default() })
     }
 
     /// The fewest substeps, and then the fewest stages, with which a step of `dt` keeps `limit`: stages of any number for
@@ -196,6 +205,10 @@ fn amplification(s: u32, x: f64) -> f64 {
 impl<S: State> Stepper<S> for Rkl2<S> {
     fn order(&self) -> u32 {
         2
+    }
+
+    fn check_symmetry(&self, symmetry: RowSymmetry) -> Result<()> {
+        self.check_rows(symmetry)
     }
 
     fn negative_real_interval(&self) -> f64 {

@@ -30,9 +30,14 @@ const NEGATIVE_REAL: f64 = 2.512745326618329;
 /// Source: C.-W. Shu and S. Osher, 1988, eq. 2.18; errata 56 for the intervals.
 /// See also: [`Rk4`](crate::Rk4), a longer step an evaluation for smooth fields.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct SspRk3<S> {
+    #[cfg_attr(feature = "serde", serde(skip))]
     k: Option<S>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     sum: Option<S>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     stage: Option<S>,
 }
 
