@@ -40,6 +40,7 @@ mod boundary;
 mod domain;
 mod error;
 mod exp;
+mod io;
 mod kernel;
 mod lanes;
 mod linear;
@@ -62,6 +63,7 @@ pub use apply::{
 pub use boundary::*;
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
 pub use error::*;
+pub use io::{Pvd, Vtu, VtuValues};
 pub use kernel::{
     AnisotropicGaussian, Cic, CubicSpline, ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, Lambda,
     LatticeHat, MeshKernel, Ngp, OneSidedGaussian, QuinticSpline, Rational, RationalLaplacian, SmoothingKernel, Tsc,

@@ -1,6 +1,6 @@
 //! Stored rows as matrices, as text and as right-hand sides of other integrators.
 
-use std::io::{self, ErrorKind as IoKind, Write};
+mod full;
 
 use parops::{
     Apply, CellList, CsrMatrix, Cutoff, D1, D2, DcPse, Domain, ErrorKind, Euler, Face, Field, Gradient, Laplacian,
@@ -225,48 +225,12 @@ fn matrix_read_back_from_matrix_market_has_equal_bits() -> Result<()> {
     Ok(())
 }
 
-/// A writer that takes so many bytes, a few at a time, and then fails in one of three ways.
-struct Full {
-    room: usize,
-    kind: Option<IoKind>,
-}
-
-impl Write for Full {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let taken = bytes.len().min(self.room).min(7);
-        self.room -= taken;
-        match self.kind {
-            Some(kind) if taken == 0 => Err(kind.into()),
-            _ => Ok(taken),
-        }
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.kind.map_or(Ok(()), |kind| Err(kind.into()))
-    }
-}
-
 #[test]
 fn writer_that_fails_at_any_byte_is_a_typed_error() -> Result<()> {
     let matrix = CsrMatrix::from_triplets(2, 2, [(0, 0, 0.1), (1, 0, -2.0)])?;
     let mut text = Vec::new();
     matrix.write_matrix_market(&mut text)?;
-    let refused = |room: usize, kind: Option<IoKind>| {
-        let error = matrix.write_matrix_market(&mut Full { room, kind }).unwrap_err();
-        error.kind().clone()
-    };
-    for room in 0..text.len() {
-        let bytes = room as u64;
-        for kind in [IoKind::StorageFull, IoKind::BrokenPipe] {
-            assert_eq!(refused(room, Some(kind)), ErrorKind::Linear(LinearError::Write { kind, bytes }));
-        }
-        let kind = IoKind::WriteZero;
-        assert_eq!(refused(room, None), ErrorKind::Linear(LinearError::Write { kind, bytes }));
-    }
-    // All bytes are taken, and the flush fails.
-    let (kind, bytes) = (IoKind::StorageFull, text.len() as u64);
-    assert_eq!(refused(text.len(), Some(kind)), ErrorKind::Linear(LinearError::Write { kind, bytes }));
-    matrix.write_matrix_market(&mut Full { room: text.len(), kind: None })
+    full::check_every_byte(text.len(), |out| matrix.write_matrix_market(out))
 }
 
 /// Heun's method as somebody else would write it.

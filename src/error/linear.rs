@@ -88,12 +88,5 @@ kinds! {
             /// Largest legal value.
             high: f64,
         } => "setting {value} is outside {low} to {high}",
-        /// A writer that failed.
-        Write {
-            /// What it failed with.
-            kind: std::io::ErrorKind,
-            /// Number of bytes it had taken before.
-            bytes: u64,
-        } => "the writer failed after {bytes} bytes: {kind}",
     }
 }

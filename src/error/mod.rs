@@ -3,6 +3,7 @@
 mod apply;
 mod boundary;
 mod domain;
+mod io;
 mod kernel;
 mod linear;
 mod mesh;
@@ -16,6 +17,7 @@ mod time;
 pub use apply::ApplyError;
 pub use boundary::BoundaryError;
 pub use domain::DomainError;
+pub use io::IoError;
 pub use kernel::KernelError;
 pub use linear::LinearError;
 pub use mesh::MeshError;
@@ -128,6 +130,7 @@ impl fmt::Display for ErrorKind {
             ErrorKind::Particle(kind) => kind.fmt(f),
             ErrorKind::Neighbor(kind) => kind.fmt(f),
             ErrorKind::Operator(kind) => kind.fmt(f),
+            ErrorKind::Io(kind) => kind.fmt(f),
             ErrorKind::Apply(kind) => kind.fmt(f),
             ErrorKind::Mesh(kind) => kind.fmt(f),
             ErrorKind::Linear(kind) => kind.fmt(f),
@@ -157,6 +160,8 @@ pub enum ErrorKind {
     Neighbor(NeighborError),
     /// Methods that turn a stencil into weights.
     Operator(OperatorError),
+    /// Files written.
+    Io(IoError),
     /// Applying rows to fields.
     Apply(ApplyError),
     /// Meshes, and what goes between them and particles.
@@ -198,6 +203,7 @@ from_kind! {
     Particle: ParticleError,
     Neighbor: NeighborError,
     Operator: OperatorError,
+    Io: IoError,
     Apply: ApplyError,
     Mesh: MeshError,
     Linear: LinearError,

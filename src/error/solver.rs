@@ -146,12 +146,5 @@ kinds! {
             /// The velocity along it.
             velocity: f64,
         } => "nothing lies upstream along axis {axis}, where the velocity is {velocity}: an inflow condition is needed",
-        /// A writer that failed.
-        Write {
-            /// What it failed with.
-            kind: std::io::ErrorKind,
-            /// Number of bytes it had taken before.
-            bytes: u64,
-        } => "the writer failed after {bytes} bytes: {kind}",
     }
 }

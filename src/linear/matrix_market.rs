@@ -5,7 +5,8 @@ use std::io::{self, Write};
 
 use super::csr::CsrMatrix;
 use crate::apply::Field;
-use crate::error::{LinearError, Result};
+use crate::error::Result;
+use crate::io::counted;
 
 impl<T: Field> CsrMatrix<T> {
     /// Writes the matrix in the Matrix Market format `coordinate real general`, rows and columns counted from 1.
@@ -14,7 +15,7 @@ impl<T: Field> CsrMatrix<T> {
     /// flushed; wrap a file in a `BufWriter`.
     ///
     /// # Errors
-    /// [`LinearError::Write`] with the number of bytes taken before the writer failed.
+    /// [`IoError::Write`](crate::IoError::Write) with the number of bytes taken before the writer failed.
     ///
     /// ```
     /// let mut text = Vec::new();
@@ -25,8 +26,7 @@ impl<T: Field> CsrMatrix<T> {
     ///
     /// Source: R. F. Boisvert, R. Pozo and K. A. Remington, The Matrix Market exchange formats, 1996.
     pub fn write_matrix_market(&self, out: &mut (impl Write + ?Sized)) -> Result<()> {
-        let mut out = Counted { out, bytes: 0 };
-        self.write_to(&mut out).map_err(|error| LinearError::Write { kind: error.kind(), bytes: out.bytes }.into())
+        counted(out, |out| self.write_to(out))
     }
 
     fn write_to(&self, out: &mut impl Write) -> io::Result<()> {
@@ -39,24 +39,6 @@ impl<T: Field> CsrMatrix<T> {
             writeln!(line, "{} {} {value:.16e}", row + 1, column + 1).map_err(io::Error::other)?;
             out.write_all(line.as_bytes())?;
         }
-        out.flush()
-    }
-}
-
-/// A writer that counts the bytes taken.
-pub(crate) struct Counted<'a, W: ?Sized> {
-    pub(crate) out: &'a mut W,
-    pub(crate) bytes: u64,
-}
-
-impl<W: Write + ?Sized> Write for Counted<'_, W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let taken = self.out.write(bytes)?;
-        self.bytes += taken as u64;
-        Ok(taken)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.out.flush()
+        Ok(())
     }
 }

@@ -25,7 +25,6 @@ pub use bicgstab::BiCgStab;
 pub use csr::CsrMatrix;
 pub use gmres::Gmres;
 pub use ilu::Ilu0;
-pub(crate) use matrix_market::Counted;
 pub use solver::SparseSolver;
 pub use spectrum::{Spectrum, SpectrumEstimator};
 pub use stop::SolveReport;

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use super::fields::Fields;
 use crate::error::{Limit, Result, SolverError};
-use crate::linear::Counted;
+use crate::io::counted;
 use crate::particles::Particles;
 
 /// The sums and extrema of one field.
@@ -185,10 +185,9 @@ impl<const D: usize> Ledger<D> {
     /// their axes. Numbers read back to the same bits.
     ///
     /// # Errors
-    /// [`SolverError::Write`] with the number of bytes taken before the writer failed.
+    /// [`IoError::Write`](crate::IoError::Write) with the number of bytes taken before the writer failed.
     pub fn write_csv(&self, out: &mut (impl Write + ?Sized)) -> Result<()> {
-        let mut out = Counted { out, bytes: 0 };
-        self.write_to(&mut out).map_err(|error| SolverError::Write { kind: error.kind(), bytes: out.bytes }.into())
+        counted(out, |out| self.write_to(out))
     }
 
     fn write_to(&self, out: &mut impl Write) -> io::Result<()> {
@@ -203,8 +202,7 @@ impl<const D: usize> Ledger<D> {
             })?;
         }
         writeln!(out)?;
-        self.rows.iter().try_for_each(|row| row.write_to(out))?;
-        out.flush()
+        self.rows.iter().try_for_each(|row| row.write_to(out))
     }
 }
 
