@@ -183,7 +183,7 @@ fn legend<'a>(x: i32, y: i32, mark: Mark, color: RGBColor) -> DynElement<'static
         Mark::Triangles => TriangleMarker::new((x + 11, y), 7, color.filled()).into_dyn(),
         Mark::Crosses => Cross::new((x + 11, y), 6, color.stroke_width(2)).into_dyn(),
         Mark::Line => line(2),
-        Mark::Dashed => line(1),
+        Mark::Dashed => DashedPathElement::new([(x, y), (x + 22, y)], 6, 3, color.stroke_width(1)).into_dyn(),
     }
 }
 
@@ -209,5 +209,7 @@ fn power_of_ten(value: &f64) -> String {
 }
 
 fn plain(value: &f64) -> String {
-    format!("{:.2}", value + 0.0)
+    // A tick at zero may be off by rounding, on either side.
+    let cents = (100.0 * value).round() + 0.0;
+    format!("{:.2}", 0.01 * cents)
 }
