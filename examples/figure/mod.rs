@@ -206,7 +206,9 @@ fn bounds(curves: &[Curve], logarithmic: bool, coordinate: impl Fn(&(f64, f64)) 
 }
 
 fn power_of_ten(value: &f64) -> String {
-    if (0.1..10_000.0).contains(value) { format!("{value}") } else { format!("{value:.0e}") }
+    // Ticks are powers, and off by rounding.
+    let thousandths = (1000.0 * value).round();
+    if (100.0..1e7).contains(&thousandths) { format!("{}", thousandths / 1000.0) } else { format!("{value:.0e}") }
 }
 
 fn plain(value: &f64) -> String {
