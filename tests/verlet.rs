@@ -222,7 +222,7 @@ fn boxes_as_narrow_as_can_be_serve_whoever_crosses_their_faces() {
         let domain = Domain::new([-0.25; 2], [width - 0.25; 2], faces).unwrap();
         let mut random = Random::new(4);
         // Ties at the cutoff too: some stand on a grid of an eighth of the width.
-        let place = |x: f64, i: usize| width * if i % 3 == 0 { (8.0 * x).floor() / 8.0 } else { x } - 0.25;
+        let place = |x: f64, i: u32| width * if i.is_multiple_of(3) { (8.0 * x).floor() / 8.0 } else { x } - 0.25;
         let points = (0..60).map(|i| [0; 2].map(|_| place(random.uniform(), i))).collect();
         let mut particles = Particles::new(points).unwrap();
         let mut list = VerletList::build(&particles, &domain, Cutoff(cutoff), skin).unwrap();
