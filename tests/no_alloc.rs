@@ -6,10 +6,13 @@ use std::cell::Cell;
 
 use parops::{
     Allowance, CellList, D2, DivTensorGrad, Domain, Epsilon, Euler, Gradient, Hessian, Laplacian, Leapfrog, Method,
-    Neighbors, OneSided, Particles, Pse, Rk4, Side, Sph, Stencil, Stepper, Upwind,
+    Neighbors, OneSided, Particles, Pse, Rk4, Rkl2, Side, Sph, SspRk3, Stencil, Stepper, Upwind,
 };
 #[cfg(not(feature = "rayon"))]
-use parops::{Apply, BoundaryCondition, BoundaryRows, NeighborList, Rows, Strided};
+use parops::{
+    Apply, BiCgStab, BoundaryCondition, BoundaryRows, CsrMatrix, Gmres, Implicit, NeighborList, Rows, SparseSolver,
+    Strided,
+};
 
 struct Counting;
 
@@ -57,8 +60,13 @@ fn the_counter_counts() {
 
 #[test]
 fn steps_after_the_first_allocate_nothing() {
-    let steppers: [Box<dyn Stepper<Vec<[f64; 2]>>>; 3] =
-        [Box::new(Euler::new()), Box::new(Rk4::new()), Box::new(Leapfrog::new())];
+    let steppers: [Box<dyn Stepper<Vec<[f64; 2]>>>; 5] = [
+        Box::new(Euler::new()),
+        Box::new(Rk4::new()),
+        Box::new(Leapfrog::new()),
+        Box::new(SspRk3::new()),
+        Box::new(Rkl2::new(5).unwrap().with_substeps(3)),
+    ];
     for mut stepper in steppers {
         let mut u = vec![[1.0, 0.0]; 1000];
         let mut steps = |stepper: &mut dyn Stepper<_>, start: f64, dt: f64, n: u32| {
@@ -258,6 +266,33 @@ fn imposing_boundary_conditions_allocates_nothing_after_the_first_time() {
     impose(0.0);
     assert_eq!(allocations(|| (0..5).for_each(|n| impose(f64::from(n)))), 0);
     assert_eq!(allocations(|| boundary.replace_values(|_| 0.0, &mut u).unwrap()), 0);
+}
+
+#[cfg(not(feature = "rayon"))]
+#[test]
+fn implicit_steps_after_the_first_allocate_nothing() {
+    let (particles, domain) = particles();
+    let pse = laplacian(&particles);
+    let rows = pse.assemble(&CellList::build(&particles, &domain, pse.cutoff()).unwrap()).unwrap();
+    let solvers: &[fn(CsrMatrix) -> parops::Result<SparseSolver>] = &[
+        |matrix| SparseSolver::bicgstab(matrix, BiCgStab::new()),
+        |matrix| SparseSolver::gmres(matrix, Gmres::new()),
+        #[cfg(feature = "faer")]
+        SparseSolver::lu,
+    ];
+    for &solver in solvers {
+        let mut stepper = Implicit::crank_nicolson(rows.to_csr(0).unwrap()).unwrap().solver(solver);
+        let mut u: Vec<[f32; 2]> = particles.points().iter().map(|x| [x[0] as f32, 1.0]).collect();
+        let mut step = |n: u32| {
+            let source = &mut |t: f64, g: &mut [[f32; 2]]| {
+                g.fill([t as f32, 0.0]);
+                Ok(())
+            };
+            stepper.step(0.1 * f64::from(n), 0.1, &mut u, source).unwrap();
+        };
+        assert!(allocations(|| step(0)) > 0);
+        assert_eq!(allocations(|| (1..6).for_each(&mut step)), 0);
+    }
 }
 
 #[test]
