@@ -111,7 +111,7 @@ fn a_writer_that_fails_is_named_with_the_bytes_it_took() {
     for bytes in [0, 7, 20] {
         let error = Ledger::<2>::default().write_csv(&mut Full(bytes)).unwrap_err();
         let expected = parops::IoError::Write { kind: std::io::ErrorKind::StorageFull, bytes: bytes as u64 };
-        assert_eq!(*error.kind(), parops::ErrorKind::Solver(expected));
+        assert_eq!(*error.kind(), parops::ErrorKind::Io(expected));
     }
 }
 

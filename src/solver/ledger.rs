@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use super::fields::Fields;
-use crate::error::{Limit, Result, SolverError};
+use crate::error::{Limit, Result};
 use crate::io::counted;
 use crate::particles::Particles;
 
