@@ -50,6 +50,7 @@ mod operator;
 mod particles;
 mod scalar;
 mod scale;
+mod solver;
 mod stencil;
 mod time;
 
@@ -75,13 +76,14 @@ pub use multi_index::*;
 #[cfg(feature = "kiddo")]
 pub use neighbors::KdTree;
 pub use neighbors::{
-    BruteForce, Canonical, CellList, HalfList, Nearest, NeighborList, Neighbors, Pair, Selected, Symmetry, VerletList,
-    epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors,
+    BruteForce, Canonical, CellList, HalfList, Nearest, NeighborList, Neighbors, Pair, Selected, Symmetry, Upstream,
+    VerletList, epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors,
 };
 pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};
 pub use scalar::Scalar;
 pub use scale::{Cutoff, Epsilon, Spacing, Volumes};
+pub use solver::*;
 pub use stencil::{Neighbor, Side, Stencil};
 pub use time::*;
 

@@ -67,11 +67,12 @@ impl std::fmt::Display for Side {
 /// row.push(Neighbor { q: 3, separation: [0.25], sign: 1 });
 /// assert_eq!((row.target(), row.len(), row.separations()[0]), (7, 1, [0.25]));
 /// ```
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Stencil<const D: usize> {
     target: usize,
     center: Option<usize>,
     cutoff: f64,
+    middle: [f64; D],
     sources: Vec<u32>,
     separations: Vec<[f64; D]>,
     signs: Vec<i8>,
@@ -79,12 +80,27 @@ pub struct Stencil<const D: usize> {
     sorting: Vec<Neighbor<D>>,
 }
 
+impl<const D: usize> Default for Stencil<D> {
+    fn default() -> Self {
+        Self {
+            target: 0,
+            center: None,
+            cutoff: 0.0,
+            middle: [0.0; D],
+            sources: Vec::new(),
+            separations: Vec::new(),
+            signs: Vec::new(),
+            sorting: Vec::new(),
+        }
+    }
+}
+
 impl<const D: usize> Stencil<D> {
     /// Empties the stencil and names the target it is about to hold; its allocations are kept.
     ///
     /// `center` is the source particle that is the target, or `None` off the particles.
     pub fn reset(&mut self, target: usize, center: Option<usize>, cutoff: f64) {
-        (self.target, self.center, self.cutoff) = (target, center, cutoff);
+        (self.target, self.center, self.cutoff, self.middle) = (target, center, cutoff, [0.0; D]);
         self.sources.clear();
         self.separations.clear();
         self.signs.clear();
@@ -93,6 +109,12 @@ impl<const D: usize> Stencil<D> {
     /// Names another target for the neighbors it holds.
     pub(crate) fn rename(&mut self, target: usize) {
         self.target = target;
+    }
+
+    /// Says that the neighbors were asked around another place m than the target, `middle` = x_p - m; call it after
+    /// [`reset`](Self::reset), which sets it to zero.
+    pub fn set_middle(&mut self, middle: [f64; D]) {
+        self.middle = middle;
     }
 
     /// Adds a neighbor. Providers hold fewer than 2^32 sources, so that an index fits 32 bits.
@@ -124,6 +146,12 @@ impl<const D: usize> Stencil<D> {
     /// The cutoff r_c the neighbors were asked with.
     pub fn cutoff(&self) -> f64 {
         self.cutoff
+    }
+
+    /// x_p - m, m being the middle of the ball the neighbors were asked in: zero but for providers of upwind-biased
+    /// stencils. Windows are centered there, polynomials stay at the target.
+    pub fn middle(&self) -> [f64; D] {
+        self.middle
     }
 
     /// Number of neighbors.
@@ -172,7 +200,9 @@ impl<const D: usize> Stencil<D> {
                 .then(a.sign.cmp(&b.sign))
                 .then(a.q.cmp(&b.q))
         });
+        let middle = self.middle;
         self.reset(self.target, self.center, self.cutoff);
+        self.middle = middle;
         for &neighbor in &all {
             self.push(neighbor);
         }

@@ -6,7 +6,7 @@ use std::cell::Cell;
 
 use parops::{
     Allowance, CellList, D2, DivTensorGrad, Domain, Epsilon, Euler, Gradient, Hessian, Laplacian, Leapfrog, Method,
-    Neighbors, OneSided, Particles, Pse, Rk4, Side, Sph, Stencil, Stepper, Upwind,
+    Neighbors, OneSided, Particles, Pse, Rk4, Rkl2, Side, Sph, SspRk3, Stencil, Stepper, Upwind,
 };
 #[cfg(not(feature = "rayon"))]
 use parops::{Apply, BoundaryCondition, BoundaryRows, NeighborList, Rows, Strided};
@@ -57,8 +57,13 @@ fn the_counter_counts() {
 
 #[test]
 fn steps_after_the_first_allocate_nothing() {
-    let steppers: [Box<dyn Stepper<Vec<[f64; 2]>>>; 3] =
-        [Box::new(Euler::new()), Box::new(Rk4::new()), Box::new(Leapfrog::new())];
+    let steppers: [Box<dyn Stepper<Vec<[f64; 2]>>>; 5] = [
+        Box::new(Euler::new()),
+        Box::new(Rk4::new()),
+        Box::new(Leapfrog::new()),
+        Box::new(SspRk3::new()),
+        Box::new(Rkl2::new(5).unwrap().with_substeps(3)),
+    ];
     for mut stepper in steppers {
         let mut u = vec![[1.0, 0.0]; 1000];
         let mut steps = |stepper: &mut dyn Stepper<_>, start: f64, dt: f64, n: u32| {

@@ -7,6 +7,7 @@ mod export;
 mod fields;
 mod histogram;
 mod matrix_free;
+mod pairs;
 mod report;
 mod rows;
 #[cfg(feature = "serde")]

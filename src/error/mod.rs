@@ -10,6 +10,7 @@ mod multi_index;
 mod neighbor;
 mod operator;
 mod particle;
+mod solver;
 mod time;
 
 pub use apply::ApplyError;
@@ -22,6 +23,7 @@ pub use multi_index::MultiIndexError;
 pub use neighbor::NeighborError;
 pub use operator::OperatorError;
 pub use particle::ParticleError;
+pub use solver::{Limit, SolverError};
 pub use time::TimeError;
 
 use std::fmt;
@@ -131,6 +133,7 @@ impl fmt::Display for ErrorKind {
             ErrorKind::Linear(kind) => kind.fmt(f),
             ErrorKind::Boundary(kind) => kind.fmt(f),
             ErrorKind::Time(kind) => kind.fmt(f),
+            ErrorKind::Solver(kind) => kind.fmt(f),
             ErrorKind::User { code } => write!(f, "the caller's own error, code {code}"),
         }
     }
@@ -164,6 +167,8 @@ pub enum ErrorKind {
     Boundary(BoundaryError),
     /// Steppers and step limits.
     Time(TimeError),
+    /// Solvers: scenes and their steps.
+    Solver(SolverError),
     /// An error made by the caller's own code, see [`Error::user`].
     User {
         /// The number the caller chose.
@@ -198,4 +203,5 @@ from_kind! {
     Linear: LinearError,
     Boundary: BoundaryError,
     Time: TimeError,
+    Solver: SolverError,
 }

@@ -44,9 +44,9 @@ impl<T: Field> CsrMatrix<T> {
 }
 
 /// A writer that counts the bytes taken.
-struct Counted<'a, W: ?Sized> {
-    out: &'a mut W,
-    bytes: u64,
+pub(crate) struct Counted<'a, W: ?Sized> {
+    pub(crate) out: &'a mut W,
+    pub(crate) bytes: u64,
 }
 
 impl<W: Write + ?Sized> Write for Counted<'_, W> {

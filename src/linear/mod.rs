@@ -1,5 +1,6 @@
 //! Sparse matrices made of rows, and the linear systems they pose.
 
+mod bicgstab;
 mod condition;
 mod csr;
 mod export;
@@ -7,13 +8,23 @@ mod export;
 mod faer_matrix;
 mod gmres;
 mod ilu;
+mod invariant;
+mod krylov;
 #[cfg(feature = "faer")]
 mod lu;
 mod matrix_market;
+mod norm;
 mod replace;
+mod shifted;
 mod solver;
+mod spectrum;
+mod stop;
 
+pub use bicgstab::BiCgStab;
 pub use csr::CsrMatrix;
-pub use gmres::{Gmres, SolveReport};
+pub use gmres::Gmres;
 pub use ilu::Ilu0;
+pub(crate) use matrix_market::Counted;
 pub use solver::SparseSolver;
+pub use spectrum::{Spectrum, SpectrumEstimator};
+pub use stop::SolveReport;

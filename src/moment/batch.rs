@@ -5,7 +5,7 @@ use super::nodes::{GROUP, Group, Nodes};
 use super::solver::{Rung, Solution, worst};
 use super::system::{MomentSystem, Residual};
 use super::triangle::{Layout, Pair};
-use super::window::Window;
+use super::window::Windows;
 use crate::lanes::{Lanes, Vectors, Work, widest};
 use crate::multi_index::MultiIndex;
 
@@ -116,18 +116,17 @@ impl<const D: usize> BatchSystem<D> {
     /// Solves L stencils side by side.
     ///
     /// `z[i]` are the scaled separations of lane i, whose number may differ from lane to lane; a lane without any is
-    /// absent. `radius[i]` is its cutoff over epsilon. The weights of output k are written to `w[i][k n..(k + 1) n]`.
+    /// absent. The weights of output k are written to `w[i][k n..(k + 1) n]`.
     /// `None`, and weights that mean nothing, where a pivot is rounding: such a stencil needs QR. So may one whose
     /// solution is not [sharp](Solution::is_sharp).
     pub(crate) fn solve<const L: usize>(
         &self,
         z: [&[[f64; D]]; L],
-        window: Window,
-        radius: [f64; L],
+        windows: Windows<D, L>,
         scratch: &mut BatchScratch<L>,
         w: [&mut [f64]; L],
     ) -> [Option<Solution<f64>>; L] {
-        widest(Batch { system: self, z, window, radius, scratch, w })
+        widest(Batch { system: self, z, windows, scratch, w })
     }
 
     #[inline(always)]
@@ -135,8 +134,7 @@ impl<const D: usize> BatchSystem<D> {
         &self,
         vectors: V,
         z: [&[[f64; D]]; L],
-        window: Window,
-        radius: [f64; L],
+        windows: Windows<D, L>,
         scratch: &mut BatchScratch<L>,
         w: [&mut [f64]; L],
     ) -> [Option<Solution<f64>>; L] {
@@ -144,7 +142,7 @@ impl<const D: usize> BatchSystem<D> {
             return [None; L];
         }
         let counts = z.map(<[_]>::len);
-        scratch.nodes.load(z, window, radius);
+        scratch.nodes.load(z, windows);
         self.accumulate(vectors, scratch);
         let layout = Layout { size: self.conditions, extra: self.outputs + 1 };
         self.fill(layout, scratch);
@@ -346,8 +344,7 @@ impl<const D: usize> BatchSystem<D> {
 struct Batch<'a, const D: usize, const L: usize> {
     system: &'a BatchSystem<D>,
     z: [&'a [[f64; D]]; L],
-    window: Window,
-    radius: [f64; L],
+    windows: Windows<D, L>,
     scratch: &'a mut BatchScratch<L>,
     w: [&'a mut [f64]; L],
 }
@@ -357,8 +354,8 @@ impl<const D: usize, const L: usize> Work for Batch<'_, D, L> {
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) -> Self::Out {
-        let Self { system, z, window, radius, scratch, w } = self;
-        system.solve_with(vectors, z, window, radius, scratch, w)
+        let Self { system, z, windows, scratch, w } = self;
+        system.solve_with(vectors, z, windows, scratch, w)
     }
 }
 

@@ -25,3 +25,4 @@ pub use qr::{PivotedQr, Qr};
 pub use solver::{MomentScratch, MomentSolver, Rung, Solution};
 pub use system::{MomentSystem, Residual};
 pub use window::Window;
+pub(crate) use window::Windows;

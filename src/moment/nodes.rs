@@ -1,6 +1,6 @@
 //! The neighbors of several stencils side by side, with their windows.
 
-use super::window::Window;
+use super::window::{Window, Windows};
 use crate::exp::exp;
 use crate::lanes::Lanes;
 
@@ -36,7 +36,7 @@ impl<const L: usize> Nodes<L> {
     }
 
     #[inline(always)]
-    pub(super) fn load<const D: usize>(&mut self, z: [&[[f64; D]]; L], window: Window, radius: [f64; L]) {
+    pub(super) fn load<const D: usize>(&mut self, z: [&[[f64; D]]; L], windows: Windows<D, L>) {
         let (shortest, longest) =
             z.iter().fold((usize::MAX, 0), |(low, high), z| (low.min(z.len()), high.max(z.len())));
         let (full, groups) = (shortest / GROUP, longest.div_ceil(GROUP));
@@ -61,13 +61,18 @@ impl<const L: usize> Nodes<L> {
         }
         self.windows.clear();
         self.windows.resize(groups, blank);
+        let Windows { shape, radius, middle } = windows;
+        let middle: [Lanes<L>; D] = std::array::from_fn(|axis| Lanes(middle.map(|middle| middle[axis])));
         for (values, places) in self.windows.iter_mut().zip(self.places.chunks_exact(D)) {
             for (q, value) in values.iter_mut().enumerate() {
-                let squared = places.iter().fold(Lanes::ZERO, |sum, place| sum + place[q] * place[q]);
-                *value = match window {
+                let squared = places.iter().zip(&middle).fold(Lanes::ZERO, |sum, (place, &middle)| {
+                    let away = place[q] - middle;
+                    sum + away * away
+                });
+                *value = match shape {
                     Window::Exponential => exp(Lanes::ZERO - squared),
                     Window::Wendland => squared.zip(Lanes(radius), |squared, radius| {
-                        let root = window.root(squared, radius);
+                        let root = shape.root(squared, radius);
                         root * root
                     }),
                 };

@@ -14,6 +14,16 @@ pub enum Window {
     Wendland,
 }
 
+/// The windows of L stencils.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Windows<const D: usize, const L: usize> {
+    pub(crate) shape: Window,
+    /// Cutoff over epsilon.
+    pub(crate) radius: [f64; L],
+    /// Where each window is centered, as a scaled separation; zero where that is the target.
+    pub(crate) middle: [[f64; D]; L],
+}
+
 impl Window {
     /// sqrt(phi), from |z|^2 and the support radius in units of epsilon; zero outside the radius for Wendland.
     #[inline]

@@ -20,6 +20,7 @@ mod selected;
 mod table;
 #[cfg(feature = "kiddo")]
 mod tree;
+mod upstream;
 mod verlet;
 
 pub use brute_force::BruteForce;
@@ -33,6 +34,7 @@ pub use pair::{Pair, Symmetry};
 pub use selected::Selected;
 #[cfg(feature = "kiddo")]
 pub use tree::KdTree;
+pub use upstream::Upstream;
 pub use verlet::VerletList;
 
 use crate::error::Result;

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::{Batch, BatchScratch, BatchSystem};
 use crate::lanes::{Common, Vectors};
-use crate::moment::{MomentScratch, MomentSolver, MomentSystem, Qr, Rung, Solution, Window};
+use crate::moment::{MomentScratch, MomentSolver, MomentSystem, Qr, Rung, Solution, Window, Windows};
 use crate::multi_index::{MultiIndex, Term, graded};
 
 const RADIUS: f64 = 2.2;
@@ -70,7 +70,8 @@ fn solve<const D: usize, const L: usize>(
     scratch: &mut BatchScratch<L>,
 ) -> [Found; L] {
     let mut weights = stencils.map(|z| vec![f64::NAN; outputs * z.len()]);
-    let solutions = system.solve(stencils, window, [RADIUS; L], scratch, weights.each_mut().map(Vec::as_mut_slice));
+    let windows = Windows { shape: window, radius: [RADIUS; L], middle: [[0.0; D]; L] };
+    let solutions = system.solve(stencils, windows, scratch, weights.each_mut().map(Vec::as_mut_slice));
     let mut solutions = solutions.into_iter();
     weights.map(|weights| (solutions.next().flatten(), weights))
 }
@@ -79,7 +80,8 @@ fn solve<const D: usize, const L: usize>(
 fn solve_common<const D: usize>(system: &BatchSystem<D>, outputs: usize, z: &[[f64; D]], window: Window) -> Found {
     let mut weights = vec![f64::NAN; outputs * z.len()];
     let (scratch, w) = (&mut BatchScratch::default(), [weights.as_mut_slice()]);
-    let [solution] = Common.run(Batch { system, z: [z], window, radius: [RADIUS], scratch, w });
+    let windows = Windows { shape: window, radius: [RADIUS], middle: [[0.0; D]] };
+    let [solution] = Common.run(Batch { system, z: [z], windows, scratch, w });
     (solution, weights)
 }
 

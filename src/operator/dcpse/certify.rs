@@ -3,8 +3,9 @@
 use super::Settings;
 use super::group::{Column, Conditions, Group, Pairing};
 use crate::error::{Error, ErrorKind, OperatorError, Result};
-use crate::moment::{BatchScratch, MomentScratch, MomentSolver, Rung, Solution};
+use crate::moment::{BatchScratch, MomentScratch, MomentSolver, Rung, Solution, Windows};
 use crate::operator::method::spread;
+use crate::scalar::square;
 use crate::stencil::Stencil;
 
 /// Room for the scaled separations and the weights of L targets.
@@ -57,6 +58,7 @@ pub(super) fn certify<S: MomentSolver, const D: usize, const K: usize, const L: 
         scales[i] = settings.scale(jobs[i].row)?;
         Ok(Certificate::default())
     });
+    let middle: [_; L] = std::array::from_fn(|i| jobs[i].row.middle().map(|x| x * scales[i].0));
     let particle = jobs.iter().all(|job| job.row.center().is_some());
     for group in groups {
         let (outputs, conditions, pairing) = group.at(particle);
@@ -75,7 +77,8 @@ pub(super) fn certify<S: MomentSolver, const D: usize, const K: usize, const L: 
         if S::AFTER_CHOLESKY {
             let z = room.z.each_ref().map(Vec::as_slice);
             let w = room.w.each_mut().map(Vec::as_mut_slice);
-            known = batch.solve(z, settings.window, scales.map(|(_, ratio)| ratio), &mut room.batch, w);
+            let windows = Windows { shape: settings.window, radius: scales.map(|(_, ratio)| ratio), middle };
+            known = batch.solve(z, windows, &mut room.batch, w);
         }
         let mut finish = |i: usize, certificate: &mut Certificate| {
             let (inverse, ratio) = scales[i];
@@ -87,7 +90,8 @@ pub(super) fn certify<S: MomentSolver, const D: usize, const K: usize, const L: 
             let solution = match known[i].filter(|known| known.is_sharp(conditions, largest)) {
                 Some(known) => known,
                 None => {
-                    system.fill(z, settings.window, ratio);
+                    let root = |q: usize| settings.window.root(square(&from_middle(&z[q], &middle[i])), ratio);
+                    system.fill_windowed(z, |q, _| root(q));
                     let solved = solver.climb(known[i], system, &mut room.moments, w);
                     solved.map_err(|error| match *error.kind() {
                         // Without weights all is missed.
@@ -144,6 +148,11 @@ fn nodes<const D: usize>(
         z.push([0.0; D]);
     }
     Ok(())
+}
+
+/// Where a node lies as its window sees it.
+fn from_middle<const D: usize>(z: &[f64; D], middle: &[f64; D]) -> [f64; D] {
+    std::array::from_fn(|axis| z[axis] - middle[axis])
 }
 
 /// Turns a solved column into the weights of its output and its share of the diagonal.

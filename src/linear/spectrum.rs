@@ -1,0 +1,140 @@
+//! Where the eigenvalues of an operator lie: the rightmost and the largest, estimated from products.
+
+use super::krylov::Search;
+use crate::apply::Apply;
+use crate::error::{LinearError, Result};
+
+/// Estimates the rightmost eigenvalue max Re(lambda) and the spectral radius max |lambda| of a linear map u -> A u, from
+/// products with A alone: stored rows, an operator without weights, a sum of both, or what boundary conditions leave of
+/// one.
+///
+/// Two runs of the Krylov-Schur method with m vectors from a fixed pseudo-random start: equal maps give equal bits. A run
+/// ends when the residual |A x - lambda x| of its unit vector x is below the tolerance times the radius and restarts have
+/// not moved lambda by more; the radius is found to 1e-3. Cost: 150 to 500 products where the rightmost eigenvalue stands
+/// apart (diffusion; advection that grows fast), with N m^2 operations beside every m of them; memory m + 1 vectors.
+///
+/// Accuracy on sets of up to 400 particles, against dense eigenvalues, in units of the radius: 1e-9 where the run
+/// converged. Growth below about 0.005 amid a spectrum along the imaginary axis (advection with '+') does not converge in
+/// 3000 products; the estimate was then within 0.002. Among eigenvalues crowded at zero growth below about (10/products)^2 is
+/// missed: a large abscissa with a small residual proves growth, a small one does not prove stability.
+///
+/// Defaults: m = 32, tolerance 1e-9, at most 3000 products a run.
+///
+/// ```
+/// use parops::{CsrMatrix, SpectrumEstimator};
+/// let spiral = CsrMatrix::from_triplets(3, 3, [(0, 0, 0.1), (0, 1, 2.0), (1, 0, -2.0), (1, 1, 0.1), (2, 2, -3.0)])?;
+/// let spectrum = SpectrumEstimator::new().of(&spiral)?;
+/// assert!((spectrum.abscissa - 0.1).abs() < 1e-12 && (spectrum.frequency - 2.0).abs() < 1e-12);
+/// assert!((spectrum.radius - 3.0).abs() < 1e-12 && spectrum.converged);
+/// # parops::Result::Ok(())
+/// ```
+///
+/// Source: G. W. Stewart, A Krylov-Schur algorithm for large eigenproblems, 2001; the eigenvalues of the small matrix are
+/// nalgebra's, shifted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpectrumEstimator {
+    subspace: usize,
+    tolerance: f64,
+    most: usize,
+}
+
+/// What is known of a spectrum, in the units of the operator, 1/time for a right-hand side.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Spectrum {
+    /// max Re(lambda): the rate at which the fastest mode grows.
+    pub abscissa: f64,
+    /// |Im(lambda)| of that mode.
+    pub frequency: f64,
+    /// |A x - lambda x| of its unit vector x.
+    pub residual: f64,
+    /// max |lambda|, from below.
+    pub radius: f64,
+    /// Products with A.
+    pub applies: usize,
+    /// Whether the residual is below the tolerance times the radius; where not, the abscissa is a guess.
+    pub converged: bool,
+}
+
+impl Spectrum {
+    /// Abscissa over radius; 0 for the zero map.
+    ///
+    /// Rounding of the estimate is below 1e-12, so that a limit of 1e-8 tells growth from it.
+    pub fn relative_growth(&self) -> f64 {
+        if self.radius > 0.0 { self.abscissa / self.radius } else { 0.0 }
+    }
+}
+
+impl Default for SpectrumEstimator {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl SpectrumEstimator {
+    /// The estimator at its defaults.
+    pub fn new() -> Self {
+        Self { subspace: 32, tolerance: 1e-9, most: 3000 }
+    }
+
+    /// Sets the number m of vectors, at least 8.
+    #[must_use]
+    pub fn subspace(self, vectors: usize) -> Self {
+        Self { subspace: vectors.max(8), ..self }
+    }
+
+    /// Sets after how many products a run ends, at the next restart.
+    #[must_use]
+    pub fn most(self, products: usize) -> Self {
+        Self { most: products, ..self }
+    }
+
+    /// Sets the residual in units of the radius.
+    ///
+    /// # Errors
+    /// [`LinearError::Setting`] outside 1e-14 to 0.1.
+    pub fn tolerance(self, tolerance: f64) -> Result<Self> {
+        let (low, high) = (1e-14, 0.1);
+        if !(low..=high).contains(&tolerance) {
+            return Err(LinearError::Setting { value: tolerance, low, high }.into());
+        }
+        Ok(Self { tolerance, ..self })
+    }
+
+    /// The spectrum of an operator that maps a field onto one of the same particles.
+    ///
+    /// # Errors
+    /// [`LinearError::NotSquare`] where targets and sources differ in number: use [`estimate`](Self::estimate) with a
+    /// closure that fills in the other sources; and those of `estimate`.
+    pub fn of<A: Apply<f64> + ?Sized>(&self, operator: &A) -> Result<Spectrum> {
+        let (rows, columns) = (operator.targets(), operator.sources());
+        if rows != columns {
+            return Err(LinearError::NotSquare { rows, columns }.into());
+        }
+        self.estimate(rows, |u, du| operator.apply(u, du))
+    }
+
+    /// The spectrum of the linear map `apply(u, du)`, du = A u, of vectors of length n; `du` is zero before.
+    ///
+    /// # Errors
+    /// Those of `apply`; [`LinearError::Value`] naming the first entry of a product that is not finite;
+    /// [`LinearError::NotConverged`] where the eigenvalues of the small matrix are not found;
+    /// [`ParticleError::Memory`](crate::ParticleError::Memory) where m + 1 vectors do not fit.
+    pub fn estimate(&self, n: usize, mut apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<Spectrum> {
+        if n == 0 {
+            return Ok(Spectrum { converged: true, ..Spectrum::default() });
+        }
+        let outer = Search { subspace: self.subspace, tolerance: self.tolerance.max(1e-3), most: self.most };
+        let largest = outer.run(n, &mut apply, |value| value.norm(), 0.0)?;
+        let right = Search { tolerance: self.tolerance, ..outer };
+        let rightmost = right.run(n, &mut apply, |value| value.re, largest.value.norm())?;
+        Ok(Spectrum {
+            abscissa: rightmost.value.re,
+            frequency: rightmost.value.im.abs(),
+            residual: rightmost.residual,
+            radius: largest.value.norm().max(rightmost.value.norm()),
+            applies: largest.applies + rightmost.applies,
+            converged: rightmost.converged,
+        })
+    }
+}

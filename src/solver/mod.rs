@@ -1,0 +1,53 @@
+//! Advection-diffusion solvers.
+//!
+//! A scene ([`AdvectionDiffusion`]) names its physics, term by term; a solver makes the rows of a particle set from it
+//! once, and knows before each step whether the step is legal ([`Limits`]). What a step did stands in the ledger
+//! ([`LedgerRow`]).
+//!
+//! The scene, its coefficients, [`Limits`], [`Ledger`] and the policies know nothing of how the particles move: every
+//! solver is made of them. [`SceneTerm`] is the seam of a term, [`Transport`] that of an advection scheme,
+//! [`FlowDivergence`] that of div v, [`Edge`] that of the boundary. [`SemiDiscrete`] and [`Eulerian`] are for particles
+//! that stay.
+
+mod advection;
+mod central;
+mod coefficient;
+mod diffusion;
+mod divergence;
+mod edge;
+mod eulerian;
+mod fields;
+mod free;
+mod ledger;
+mod limits;
+mod policy;
+mod saved;
+mod scene;
+mod scheme;
+mod semi_discrete;
+mod source;
+mod steady;
+mod term;
+mod transport;
+mod upwind;
+
+pub use advection::{Advection, AdvectionRows};
+pub use central::{Central, CentralRows};
+pub use coefficient::{Diffusivity, Steady, Velocity};
+pub use diffusion::{Diffusion, DiffusionRows};
+pub use divergence::{ComputedDivergence, DivergenceValues, FlowDivergence, GivenDivergence};
+pub use edge::{Boundary, Bounded, BoundedState, Edge};
+pub use eulerian::Eulerian;
+pub use fields::Fields;
+pub use ledger::{Ledger, LedgerRow, Totals};
+pub use limits::{Limits, Rate};
+pub use policy::{GrowthPolicy, StepPolicy};
+pub use saved::SavedRun;
+pub use scene::{AdvectionDiffusion, NoTerms, Scene};
+pub use scheme::{ImplicitScheme, Stages, TimeScheme};
+pub use semi_discrete::SemiDiscrete;
+pub use source::Source;
+pub use steady::{SteadyState, steady};
+pub use term::{SceneTerm, Site};
+pub use transport::{Transport, TransportRows};
+pub use upwind::OneSidedRows;
