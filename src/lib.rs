@@ -55,7 +55,8 @@ mod stencil;
 mod time;
 
 pub use apply::{
-    Apply, Field, Histogram, MatrixFree, RawRows, Report, Row, Rows, Strided, SymmetricPse, UpwindRows, Vector,
+    Apply, Field, Histogram, MatrixFree, MovingMethod, RawRows, Report, Row, Rows, Strided, SymmetricPse, UpwindRows,
+    Vector,
 };
 pub use boundary::*;
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
@@ -77,7 +78,7 @@ pub use multi_index::*;
 pub use neighbors::KdTree;
 pub use neighbors::{
     BruteForce, Canonical, CellList, HalfList, Nearest, NeighborList, Neighbors, Pair, Selected, Symmetry, Upstream,
-    VerletList, epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors,
+    VerletList, epsilon_from_neighbors, fill_distance, least_gap, mean_neighbor_distance, volumes_from_neighbors,
 };
 pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};
