@@ -99,41 +99,40 @@ fn volumes_and_values_follow_the_divergence_at_the_order_of_the_stepper() -> Res
     Ok(())
 }
 
-#[test]
-fn swirl_that_turns_back_returns_to_its_start_at_the_order_of_the_stepper() -> Result<()> {
-    const PERIOD: f64 = 1.5;
+/// How far particles are from where they began after the flow has run forth and, turned round, back.
+fn miss<St: Stepper<MovingState<2, f64>>>(stepper: impl Fn() -> St, dt: f64) -> Result<f64> {
+    const TIME: f64 = 0.75;
     let particles = Particles::lattice([0.0; 2], [1.0; 2], [8; 2])?;
-    let u: Vec<f64> = particles.points().iter().map(|x| x[0]).collect();
-    let there_and_back = |x: &[f64; 2], t: f64| swirl(x).map(|v| 2.0 * v * (std::f64::consts::PI * t / PERIOD).cos());
-    fn miss<St: Stepper<MovingState<2, f64>>>(
-        stepper: St,
-        particles: &Particles<2>,
-        u: &[f64],
-        velocity: impl Fn(&[f64; 2], f64) -> [f64; 2] + Sync,
-        dt: f64,
-    ) -> Result<f64> {
-        let scene = AdvectionDiffusion::<2>::new().advection(velocity, Carried);
-        let mut run = Lagrangian::new(scene, particles, u, &torus(), stepper)?;
-        run.advance(PERIOD, dt)?;
-        let apart = |(x, y): (&[f64; 2], &[f64; 2])| (x[0] - y[0]).hypot(x[1] - y[1]);
-        Ok(run.points().iter().zip(particles.points()).map(apart).fold(0.0, f64::max))
-    }
-    // Turned back by the sign of v itself the way is the same step by step.
-    let sign = |x: &[f64; 2], t: f64| swirl(x).map(|v| if t < 0.5 * PERIOD { v } else { -v });
-    let [a, b] = [0.05, 0.025].map(|dt| miss(Rk4::new(), &particles, &u, sign, dt).unwrap());
-    let order = (a / b).log2();
-    assert!(b < 1e-5 && order > 3.7, "{a:e} {b:e} {order}");
-    // A flow that is odd about half time is followed back by symmetric errors: what is left is of higher order still.
-    let [a, b] = [0.075, 0.0375].map(|dt| miss(SspRk3::new(), &particles, &u, there_and_back, dt).unwrap());
-    let order = (a / b).log2();
-    assert!(order > 2.7, "{a:e} {b:e} {order}");
+    let u = [1.0; 64];
+    let scene = |sign: f64| {
+        AdvectionDiffusion::<2>::new().advection(Steady(move |x: &[f64; 2]| swirl(x).map(|v| sign * v)), Carried)
+    };
+    let mut forth = Lagrangian::new(scene(1.0), &particles, &u, &torus(), stepper())?;
+    forth.advance(TIME, dt)?;
+    let mut back = Lagrangian::new(scene(-1.0), &forth.particles()?, &u, &torus(), stepper())?;
+    back.advance(TIME, dt)?;
+    let apart = |(x, y): (&[f64; 2], &[f64; 2])| (x[0] - y[0]).hypot(x[1] - y[1]);
+    Ok(back.points().iter().zip(particles.points()).map(apart).fold(0.0, f64::max))
+}
+
+#[test]
+fn flow_turned_round_takes_particles_back_at_the_order_of_the_stepper() -> Result<()> {
+    // The errors of an even order cancel on the way back but for the next order.
+    let order = |a: f64, b: f64| (a / b).log2();
+    let (a, b) = (miss(Rk4::new, 0.05)?, miss(Rk4::new, 0.025)?);
+    assert!((3.7..5.5).contains(&order(a, b)), "{a:e} {b:e}");
+    let (a, b) = (miss(SspRk3::new, 0.05)?, miss(SspRk3::new, 0.025)?);
+    assert!((2.7..3.5).contains(&order(a, b)), "{a:e} {b:e}");
+    let (a, b) = (miss(Euler::new, 0.01)?, miss(Euler::new, 0.005)?);
+    assert!((0.8..1.2).contains(&order(a, b)), "{a:e} {b:e}");
     Ok(())
 }
 
-/// PSE of order 2 whose particles may lose some of their overlap.
+/// PSE of order 2 on short supports, for what does not depend on accuracy.
 fn loose<const D: usize>(particles: &Particles<D>, ratio: f64) -> Pse<parops::Exchange<D>> {
     let epsilon = particles.spacing().unwrap().epsilon(ratio).unwrap();
-    Pse::new(Laplacian::<D>, 2, epsilon, particles.volumes().unwrap()).unwrap().allow(Allowance::Everywhere)
+    let pse = Pse::new(Laplacian::<D>, 2, epsilon, particles.volumes().unwrap()).unwrap();
+    pse.support::<D>(2.5).unwrap().allow(Allowance::Everywhere)
 }
 
 #[test]
@@ -349,10 +348,10 @@ fn velocities_of_particles_are_differentiated_by_rows() -> Result<()> {
         assert!((limits.rate(Limit::Distortion).frequency - 2.0 * norm).abs() < 1e-7);
         assert!((limits.rate(Limit::Compression).decay - 0.75).abs() < 1e-7);
     }
+    // Each going straight on, the particles fill det(1 + dt A) of their volume.
     held.step(0.01)?;
-    let grown = 0.75_f64 * 0.01;
-    let volume = particles.volumes()?.get(0)?;
-    assert!(held.volumes().iter().all(|v| (v / volume - grown.exp()).abs() < 1e-4));
+    let volume = particles.volumes()?.get(0)? * (1.0 + 0.75 * 0.01 + determinant * 0.01 * 0.01);
+    assert!(held.volumes().iter().all(|v| (v / volume - 1.0).abs() < 1e-8));
     Ok(())
 }
 
@@ -437,7 +436,7 @@ fn scene_of_an_eulerian_run_serves_a_lagrangian_one() -> Result<()> {
         |points: &[[f64; 2]], u: &[f64]| points.iter().zip(u).map(|(x, u)| (u - exact(x[0])).abs()).fold(0.0, f64::max);
     let (a, b) = (worst(particles.points(), &field), worst(moving.points(), &moving.values().collect::<Vec<_>>()));
     println!("eulerian {a:e}, lagrangian {b:e}");
-    assert!(a < 0.05 && b < 0.2 * a);
+    assert!(a < 0.1 && b < 0.2 * a);
     Ok(())
 }
 
@@ -556,8 +555,8 @@ fn saved_run_of_another_shape_is_refused() -> Result<()> {
     run.step(0.1)?;
     let before = picture(&run);
     let spoilt: [fn(&mut SavedParticles<f64, Rk4<MovingState<2, f64>>>); 5] = [
-        |saved| drop(saved.points.pop()),
-        |saved| drop(saved.volumes.pop()),
+        |saved| saved.points.truncate(1),
+        |saved| saved.volumes.truncate(1),
         |saved| saved.start.push(1.0),
         |saved| saved.searched_at.push(1.0),
         |saved| saved.volumes[0] = -1.0,
@@ -571,8 +570,67 @@ fn saved_run_of_another_shape_is_refused() -> Result<()> {
     let saved = run.save();
     run.step(0.1)?;
     run.resume(saved)?;
-    assert_eq!(picture(&run), before);
+    // What is known of a step, its limit say, is known again after the next.
+    let after = picture(&run);
+    assert_eq!((after.0, after.1, after.2, after.3), (before.0, before.1, before.2, before.3));
     let particles = run.particles()?;
     assert_eq!(particles.volumes()?, &Volumes::each(vec![1.0 / 36.0; 36])?);
+    Ok(())
+}
+
+#[test]
+fn mirror_faces_bound_moving_particles() -> Result<()> {
+    // v vanishes at the walls; behind them is the same again, so nothing diffuses through.
+    const NU: f64 = 0.05;
+    let walls = Domain::new([0.0], [1.0], [[Face::MirrorEven; 2]])?;
+    let particles = Particles::lattice([0.0], [1.0], [64])?;
+    let pi = std::f64::consts::PI;
+    let u: Vec<f64> = particles.points().iter().map(|x| (pi * x[0]).cos()).collect();
+    let pse = Pse::new(Laplacian::<1>, 2, particles.spacing()?.epsilon(1.5)?, particles.volumes()?)?;
+    let scene = AdvectionDiffusion::<1>::new().diffusion(NU, pse.clone());
+    let mut still = Lagrangian::new(scene, &particles, &u, &walls, Rk4::new())?;
+    still.advance(0.5, 1e-3)?;
+    let decay = (-NU * pi * pi * 0.5).exp();
+    let worst = still.values().zip(&u).map(|(u, start)| (u - decay * start).abs()).fold(0.0, f64::max);
+    assert!(worst < 1e-3, "{worst}");
+    assert!(still.ledger().fields[0].drift.abs() < 1e-13);
+
+    let scene = AdvectionDiffusion::<1>::new()
+        .diffusion(NU, pse.allow(Allowance::Everywhere))
+        .advection(Steady(move |x: &[f64; 1]| [0.2 * (pi * x[0]).sin()]), Carried)
+        .computed_divergence();
+    let mut moved = Lagrangian::new(scene, &particles, &vec![1.0; 64], &walls, Rk4::new())?;
+    moved.advance(0.3, 1e-3)?;
+    let row = moved.ledger();
+    // Mass goes to the right wall and stays inside.
+    assert!(row.fields[0].drift.abs() < 1e-6 && row.fields[0].first[0] > 0.51, "{row:?}");
+    let out = Steady(|_: &[f64; 1]| [0.2]);
+    let scene = AdvectionDiffusion::<1>::new().advection(out, Carried);
+    let mut run = Lagrangian::new(scene, &particles, &u, &walls, Rk4::new())?;
+    let error = run.advance(1.0, 0.01).unwrap_err();
+    assert_eq!((error.particle(), run.points()[63][0] <= 1.0), (Some(63), true));
+    Ok(())
+}
+
+#[test]
+fn fields_of_either_precision_move_alike() -> Result<()> {
+    let particles = Particles::jittered([0.0; 2], [1.0; 2], [12; 2], 0.2, 11)?;
+    let wave = |x: &[f64; 2]| (TAU * x[0]).sin();
+    let pse = || loose(&particles, 1.0);
+    let steady = Steady(swirl);
+    let one: Vec<f64> = particles.points().iter().map(wave).collect();
+    let scene = AdvectionDiffusion::<2>::new().diffusion(0.01, pse()).advection(steady, Carried);
+    let mut one = Lagrangian::new(scene, &particles, &one, &torus(), Rk4::new())?;
+    let two: Vec<[f32; 2]> = particles.points().iter().map(|x| [wave(x) as f32, -2.0 * wave(x) as f32]).collect();
+    let scene =
+        AdvectionDiffusion::<2>::new().fields::<[f32; 2]>().diffusion(0.01, pse()).advection(Steady(swirl), Carried);
+    let mut two = Lagrangian::new(scene, &particles, &two, &torus(), Rk4::new())?;
+    one.advance(0.1, 0.005)?;
+    two.advance(0.1, 0.005)?;
+    // 20 steps of sums of some 20 terms, in eps of f32.
+    let limit = 20.0 * 20.0 * f64::from(f32::EPSILON);
+    for (one, [same, twice]) in one.values().zip(two.values()) {
+        assert!((f64::from(same) - one).abs() < limit && (f64::from(twice) + 2.0 * one).abs() < 2.0 * limit);
+    }
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! Methods for particles that move: what of them follows the set.
 
+use crate::domain::Domain;
 use crate::error::{OperatorError, Result};
 use crate::kernel::Kernel;
 use crate::moment::MomentSolver;
@@ -19,7 +20,7 @@ pub trait MovingMethod<const D: usize>: Method<D, Out = [f64; 1]> + Clone + Send
     ///
     /// # Errors
     /// Where the set has too few particles for the method.
-    fn reach(&self, particles: &Particles<D>) -> Result<[Cutoff; 2]>;
+    fn reach(&self, particles: &Particles<D>, domain: &Domain<D>) -> Result<[Cutoff; 2]>;
 
     /// Takes the volumes of now.
     fn set_volumes(&mut self, volumes: &Volumes) {
@@ -43,7 +44,7 @@ impl<K: Kernel<f64, D> + Clone, const D: usize> MovingMethod<D> for Pse<K> {
         self.design::<D>().order
     }
 
-    fn reach(&self, _: &Particles<D>) -> Result<[Cutoff; 2]> {
+    fn reach(&self, _: &Particles<D>, _: &Domain<D>) -> Result<[Cutoff; 2]> {
         Ok([self.cutoff(), self.cutoff()])
     }
 
@@ -72,8 +73,8 @@ where
         self.own_order()
     }
 
-    fn reach(&self, particles: &Particles<D>) -> Result<[Cutoff; 2]> {
-        let cutoff = self.cutoff(particles)?;
+    fn reach(&self, particles: &Particles<D>, domain: &Domain<D>) -> Result<[Cutoff; 2]> {
+        let cutoff = self.cutoff_in(particles, domain)?;
         Ok([cutoff, Cutoff(GROWTH * GROWTH * cutoff.0)])
     }
 

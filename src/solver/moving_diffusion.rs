@@ -24,7 +24,7 @@ const SKIN: f64 = 0.15;
 pub struct ListSettings {
     /// The cutoff of the rows; by default that of the method.
     pub cutoff: Option<f64>,
-    /// The skin of the list; by default 0.15 of its reach.
+    /// The skin of the list; by default 0.15 of its reach, or less in a narrow domain.
     pub skin: Option<f64>,
 }
 
@@ -190,15 +190,15 @@ impl<C: Diffusivity<D>, M: MovingMethod<D>, const D: usize, E: Fields> MovingDif
         }
         let [cutoff, reach] = match list.cutoff {
             Some(cutoff) => [cutoff; 2],
-            None => self.method.reach(particles)?.map(|cutoff| cutoff.0),
+            None => self.method.reach(particles, domain)?.map(|cutoff| cutoff.0),
         };
-        let skin = list.skin.unwrap_or(SKIN * reach);
-        // Rows of a distorted set may grow, as far as images are counted rightly.
+        // Skin and growth are room to move in, as far as images are counted rightly.
         let widths = domain.widths();
         let closed = domain.faces().map(|faces| faces.iter().all(|&face| face != Face::Open));
-        let widest = widths.iter().zip(closed).filter(|&(_, closed)| closed);
-        let room = widest.fold(f64::INFINITY, |room, (width, _)| room.min(0.499 * width - skin));
-        let reach = reach.min(room).max(cutoff);
+        let narrowest = widths.iter().zip(closed).filter(|&(_, closed)| closed);
+        let room = narrowest.fold(f64::INFINITY, |room, (width, _)| room.min(0.499 * width));
+        let skin = list.skin.unwrap_or((SKIN * reach).min(0.5 * (room - cutoff)).max(0.0));
+        let reach = reach.min(room - skin).max(cutoff);
         let list = VerletList::build(particles, domain, Cutoff(reach), skin)?;
         let mut method = self.method.clone();
         method.set_volumes(particles.volumes()?);
