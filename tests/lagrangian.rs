@@ -132,7 +132,7 @@ fn flow_turned_round_takes_particles_back_at_the_order_of_the_stepper() -> Resul
 fn loose<const D: usize>(particles: &Particles<D>, ratio: f64) -> Pse<parops::Exchange<D>> {
     let epsilon = particles.spacing().unwrap().epsilon(ratio).unwrap();
     let pse = Pse::new(Laplacian::<D>, 2, epsilon, particles.volumes().unwrap()).unwrap();
-    pse.support::<D>(2.5).unwrap().allow(Allowance::Everywhere)
+    pse.support(2.5).unwrap().allow(Allowance::Everywhere)
 }
 
 #[test]
@@ -346,7 +346,8 @@ fn velocities_of_particles_are_differentiated_by_rows() -> Result<()> {
     let norm = (0.5 * (sum + (sum * sum - 4.0 * determinant * determinant).sqrt())).sqrt();
     for limits in [a, b] {
         assert!((limits.rate(Limit::Distortion).frequency - 2.0 * norm).abs() < 1e-7);
-        assert!((limits.rate(Limit::Compression).decay - 0.75).abs() < 1e-7);
+        // Without diffusion there is nothing that an expansion could make decay too fast.
+        assert_eq!(limits.rate(Limit::Compression), Rate::default());
     }
     // Each going straight on, the particles fill det(1 + dt A) of their volume.
     held.step(0.01)?;

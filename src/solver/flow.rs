@@ -43,7 +43,7 @@ pub trait Flow<const D: usize>: Sync {
     /// div v at particle p, which is at x.
     fn divergence(&self, values: &Self::Values, p: usize, x: &[f64; D], t: f64) -> f64;
 
-    /// Adds what bounds the step: dt |grad v|_2 <= `courant`, and dt div v.
+    /// Adds what bounds the step: dt |grad v|_2 <= `courant`, and div v, which adds to the decay of what diffuses.
     ///
     /// # Errors
     /// Naming a particle where the velocity or its gradient is not finite.

@@ -257,6 +257,10 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         }
         let flow = self.scene.advection_term();
         flow.bound(&self.values, &self.site, &self.domain, t, courant, &mut limits)?;
+        if checked.is_none() {
+            // Expansion adds to the decay of what diffuses (eq. 7.11); by themselves strengths and volumes bear any.
+            limits.set(Limit::Compression, Rate::default());
+        }
         if <S::Source as SceneTerm<D, S::Value>>::PRESENT {
             self.evaluate(state);
             self.scene.source_term().limit(&mut (), &self.site, t, &self.u, &mut limits)?;
