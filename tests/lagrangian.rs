@@ -555,7 +555,8 @@ fn saved_run_of_another_shape_is_refused() -> Result<()> {
     let mut run = Lagrangian::new(scene, &particles, &[1.0; 36], &torus(), Rk4::new())?;
     run.step(0.1)?;
     let before = picture(&run);
-    let spoilt: [fn(&mut SavedParticles<f64, Rk4<MovingState<2, f64>>>); 5] = [
+    type Saved = SavedParticles<f64, Rk4<MovingState<2, f64>>>;
+    let spoilt: [fn(&mut Saved); 5] = [
         |saved| saved.points.truncate(1),
         |saved| saved.volumes.truncate(1),
         |saved| saved.start.push(1.0),
