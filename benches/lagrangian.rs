@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use parops::{
-    AdvectionDiffusion, Allowance, Carried, Domain, Euler, Exchange, Lagrangian, Laplacian, ListSettings, MovingScene,
-    MovingState, Particles, Pse, Result,
+    AdvectionDiffusion, Allowance, Carried, Domain, Euler, Exchange, Lagrangian, Laplacian, MovingScene,
+    MovingSettings, MovingState, Particles, Pse, Result,
 };
 
 /// Particles along an axis; the set is the unit square with periodic faces.
@@ -23,10 +23,10 @@ fn scene(particles: &Particles<2>) -> Result<impl MovingScene<2, Value = f64> + 
 fn run(skin: f64) -> Result<Lagrangian<2, impl MovingScene<2, Value = f64>, Euler<MovingState<2, f64>>>> {
     let particles = Particles::jittered([0.0; 2], [1.0; 2], [SIDE; 2], 0.2, 1)?;
     let u: Vec<f64> = particles.points().iter().map(|x| x[0] * (1.0 - x[0])).collect();
-    let mut list = ListSettings::default();
+    let mut list = MovingSettings::default();
     list.skin = Some(skin / SIDE as f64);
     let torus = Domain::periodic([0.0; 2], [1.0; 2])?;
-    Lagrangian::with_list(scene(&particles)?, &particles, &u, &torus, Euler::new(), list)
+    Lagrangian::with_settings(scene(&particles)?, &particles, &u, &torus, Euler::new(), list)
 }
 
 fn steps(criterion: &mut Criterion) {

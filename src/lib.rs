@@ -28,7 +28,8 @@
 //! ```
 //!
 //! # Features
-//! `faer`: sparse LU for coupled boundary conditions and steady problems; matrices as those of that package.
+//! `faer`: sparse LU for coupled boundary conditions, steady problems and implicit steps; matrices as those of that
+//! package.
 //! `kiddo`: a neighbor provider over an immutable k-d tree.
 //! `rayon`: rows are built and applied by several threads, with the same bits for any number of them.
 //! `serde`: rows and reports saved and read back bit for bit.
@@ -55,8 +56,8 @@ mod stencil;
 mod time;
 
 pub use apply::{
-    Apply, Field, Histogram, MatrixFree, MovingMethod, RawRows, Report, Row, Rows, Strided, SymmetricPse, UpwindRows,
-    Vector,
+    Advect, Apply, Field, Histogram, Hyperviscosity, MatrixFree, MovingMethod, RawRows, Report, Row, Rows, SidedRows,
+    Strided, SymmetricPse, UpwindDcPse, UpwindRows, Vector,
 };
 pub use boundary::*;
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};

@@ -4,8 +4,8 @@
 use std::f64::consts::TAU;
 
 use parops::{
-    AdvectionDiffusion, Boundary, BoundaryCondition, DcPse, Domain, Eulerian, Gradient, Laplacian, Nearest, Particles,
-    Random, Result, Rk4, Steady,
+    AdvectionDiffusion, Boundary, BoundaryCondition, DcPse, Domain, Eulerian, Gradient, GrowthPolicy, Laplacian,
+    Nearest, Particles, Random, Result, Rk4, Steady, StepPolicy,
 };
 
 /// The observed order may miss the design order by this on periodic sets.
@@ -93,7 +93,9 @@ fn periodic<const D: usize, const R: u32>(sizes: [usize; 4], k: usize, jitter: f
             .diffusion(D0, DcPse::<Laplacian<D>, R>::new())
             .advection(Steady(flow::<D>), DcPse::<Gradient<D>, R>::new())
             .source(|x, t, _| Wave { k: 1.0 }.source(x, t, &flow(x)));
-        let mut run = Eulerian::new(scene, &particles, &neighbors, Rk4::new())?;
+        // The estimate of growth costs as many products as hundreds of steps.
+        let (steps, growth) = (StepPolicy::Refuse, GrowthPolicy::Unknown);
+        let mut run = Eulerian::with_policy(scene, &particles, &neighbors, Rk4::new(), steps, growth)?;
         let mut u: Vec<f64> = particles.points().iter().map(|x| wave.value(x, 0.0)).collect();
         let dt = run.limits(&u)?.step(&Rk4::<Vec<f64>>::new());
         run.advance(&mut u, END, dt.min(END / 4.0))?;

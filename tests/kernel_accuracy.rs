@@ -3,9 +3,10 @@
 //! The table lies in `data/kernel_values.json` and is made by `data/kernel_values.py` beside it. Its arguments have full
 //! mantissas, so the square of none is exact. The absolute terms are those of the polynomial before the exponential:
 //!
-//! - the monomials of the exchange kernels and of the Hermite polynomials, sum_alpha |p_alpha z^alpha|;
+//! - the monomials of the exchange kernels, of the anisotropic ones and of the Hermite polynomials, sum_alpha |p_alpha z^alpha|;
 //! - for derivatives of the identity kernels the terms of the sum over k that [`HighOrderGaussian`] states, each power of
 //!   |z|^2 by itself;
+//! - the powers along the axis and across of the one-sided kernels;
 //! - for splines and Wendland functions the terms of sum_k z^(beta - 2k) g_m(r), g_m = ((1/2r) d/dr)^m W: every truncated
 //!   power with its g_m, below r = 1 of a spline, where the poles of these cancel, every monomial in r; for D > 1, where
 //!   r is rounded, with r |dg_m/dr| more;
@@ -14,8 +15,9 @@
 //! In single precision the reference is the value in double precision at the argument rounded first.
 
 use parops::{
-    Cic, CubicSpline, Exchange, Gaussian, HighOrderGaussian, Kernel, Lambda, LatticeHat, MeshKernel, MultiIndex, Ngp,
-    QuinticSpline, RationalLaplacian, SmoothingKernel, Term, Tsc, WendlandC2, WendlandC4, WendlandC6, WideGaussian,
+    AnisotropicGaussian, Cic, CubicSpline, Exchange, Gaussian, HighOrderGaussian, Kernel, Lambda, LatticeHat,
+    MeshKernel, MultiIndex, Ngp, OneSidedGaussian, QuinticSpline, RationalLaplacian, Side, SmoothingKernel, Term, Tsc,
+    WendlandC2, WendlandC4, WendlandC6, WideGaussian,
 };
 use serde_json::Value;
 
@@ -268,6 +270,24 @@ fn measure<const D: usize>(table: &Value, entry: &Value) -> (String, Largest) {
             let terms = terms(entry["operator"].as_str().expect("an operator"));
             section.values(&Exchange::<D>::new(&terms, order()).expect("a small kernel"), &mut largest);
         }
+        "OneSidedGaussian" => {
+            let mut exponents = [0; D];
+            exponents[0] = entry["degree"].as_u64().and_then(|degree| u8::try_from(degree).ok()).expect("a degree");
+            let term = Term { index: MultiIndex::new(exponents), factor: 1.0 };
+            let side = if entry["side"] == "left" { Side::Left } else { Side::Right };
+            let kernel = OneSidedGaussian::<D>::new(term, side, order()).expect("a small kernel");
+            section.values(&kernel, &mut largest);
+        }
+        "AnisotropicGaussian" => {
+            let units =
+                (0..D).map(|axis| MultiIndex::<D>::unit(axis).expect("an axis").exponents()).collect::<Vec<_>>();
+            let term = |i: usize, j: usize| Term {
+                index: MultiIndex::new(std::array::from_fn(|axis| units[i][axis] + units[j][axis])),
+                factor: entry["tensor"][i][j].as_f64().expect("a factor"),
+            };
+            let terms: Vec<_> = (0..D).flat_map(|i| (0..D).map(move |j| (i, j))).map(|(i, j)| term(i, j)).collect();
+            section.values(&AnisotropicGaussian::new(&terms).expect("of degree 2"), &mut largest);
+        }
         "CubicSpline" => section.smoothing(&CubicSpline::<D>::new(), &mut largest),
         "QuinticSpline" => section.smoothing(&QuinticSpline::<D>::new(), &mut largest),
         "WendlandC2" => section.smoothing(&WendlandC2::<D>::new(), &mut largest),
@@ -300,8 +320,9 @@ fn kernels_stay_within_four_units_and_derivatives_within_eight() {
 
 /// What the table must hold, so that no section is skipped: points times sections.
 const ENTRIES: usize = SMOOTH + COMPACT + MESH;
-/// Gaussian, wide Gaussian, identities, exchange kernels, the rational one; derivatives in 1D, 2D, 3D.
-const SMOOTH: usize = 24 * (3 + 3 + 12 + 44 + 1) + 12 * (4 + 14 + 34 + 4 * (3 + 9 + 19));
+/// Gaussian, wide Gaussian, identities, exchange kernels, the rational one, one-sided and anisotropic kernels; derivatives
+/// in 1D, 2D, 3D.
+const SMOOTH: usize = 24 * (3 + 3 + 12 + 44 + 1 + 19 + 3) + 12 * (4 + 14 + 34 + 4 * (3 + 9 + 19));
 /// Five smoothing kernels and the hat in 1D, 2D, 3D; derivatives of the five.
 const COMPACT: usize = 16 * 18 + 8 * ((2 + 4 + 2 + 4 + 6) + (5 + 14 + 5 + 14 + 14) + (9 + 34 + 9 + 34 + 34 + 3));
 /// Seven interpolation kernels, their derivatives and their weights, and three assignment kernels.

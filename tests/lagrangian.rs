@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 
 use parops::{
     AdvectionDiffusion, Allowance, Carried, CellList, Cutoff, DcPse, Domain, Error, ErrorKind, Euler, Eulerian, Face,
-    Gradient, Lagrangian, Lambda, Laplacian, Leapfrog, Limit, ListSettings, Mesh, MovingDiffusion, MovingScene,
-    MovingState, ParticleError, Particles, Pse, Rate, Remeshing, Result, Rk4, SavedParticles, SolverError, Spacing,
-    SspRk3, Steady, StepPolicy, Stepper, TimeError, Trigger, Volumes,
+    Gradient, GrowthPolicy, Lagrangian, Lambda, Laplacian, Leapfrog, Limit, Mesh, MovingDiffusion, MovingScene,
+    MovingSettings, MovingState, ParticleError, Particles, Pse, Rate, Remeshing, Result, Rk4, SavedParticles,
+    SolverError, Spacing, SspRk3, Steady, StepPolicy, Stepper, TimeError, Trigger, Volumes,
 };
 
 const EPS: f64 = f64::EPSILON;
@@ -417,6 +417,28 @@ fn scenes_and_steppers_that_do_not_fit_are_refused_at_construction() -> Result<(
 }
 
 #[test]
+fn growing_modes_of_the_start_are_refused_or_recorded() -> Result<()> {
+    let particles = Particles::random([0.0; 2], [1.0; 2], 400, 3)?.with_equal_volumes(1.0)?;
+    let u = vec![1.0; 400];
+    let run = |growth: GrowthPolicy| {
+        let laplacian = DcPse::<Laplacian<2>, 2>::new().neighbors_per_condition(1.0).unwrap();
+        let scene = AdvectionDiffusion::<2>::new().diffusion(1e-3, laplacian).advection([1.0, 0.0], Carried);
+        let mut settings = MovingSettings::default();
+        settings.growth = growth;
+        Lagrangian::with_settings(scene, &particles, &u, &torus(), Euler::new(), settings)
+    };
+    let refused = run(GrowthPolicy::Refuse).err();
+    let rate = match refused.as_ref().map(Error::kind) {
+        Some(ErrorKind::Solver(SolverError::Growing { rate, .. })) => *rate,
+        other => panic!("{other:?}"),
+    };
+    assert!(rate > 0.0);
+    assert_eq!(run(GrowthPolicy::Allow)?.ledger().growth, rate);
+    assert!(run(GrowthPolicy::Unknown)?.ledger().growth.is_nan());
+    Ok(())
+}
+
+#[test]
 fn scene_of_an_eulerian_run_serves_a_lagrangian_one() -> Result<()> {
     let particles = Particles::lattice([0.0; 2], [1.0; 2], [24; 2])?;
     let wave = |x: &[f64; 2]| (TAU * x[0]).sin();
@@ -449,9 +471,9 @@ fn absent_terms_take_no_room_and_lists_are_reused() -> Result<()> {
     let rebuilds = |skin: f64| -> Result<u64> {
         let scene =
             AdvectionDiffusion::<2>::new().diffusion(1e-3, loose(&particles, 1.0)).advection(Steady(swirl), Carried);
-        let mut list = ListSettings::default();
+        let mut list = MovingSettings::default();
         list.skin = Some(skin);
-        let mut run = Lagrangian::with_list(scene, &particles, &u, &torus(), Rk4::new(), list)?;
+        let mut run = Lagrangian::with_settings(scene, &particles, &u, &torus(), Rk4::new(), list)?;
         run.advance(0.2, 0.01)?;
         Ok(run.ledger().rebuilds)
     };
@@ -530,10 +552,10 @@ fn runs_resume_with_equal_bits() -> Result<()> {
             .diffusion(1e-3, loose(&particles, 1.0))
             .advection(gust, Carried)
             .source(|x, t, u| x[0] * t - u);
-        let mut list = ListSettings::default();
+        let mut list = MovingSettings::default();
         // Searched anew every few steps.
         list.skin = Some(0.004);
-        Lagrangian::with_list(scene, &particles, &u, &torus(), Rk4::new(), list)
+        Lagrangian::with_settings(scene, &particles, &u, &torus(), Rk4::new(), list)
     })?;
     both_ways(|| {
         let scene =

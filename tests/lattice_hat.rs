@@ -49,8 +49,8 @@ fn both<const D: usize>(n: usize, seed: u64) -> Result<(Vec<f64>, Vec<f64>, Rows
 fn equal_to_rounding<const D: usize>(n: usize, seed: u64) -> Failure {
     let (found, difference, rows) = both::<D>(n, seed)?;
     assert_eq!(rows.report().most, 2 * D, "the unit steps and no others");
-    // Separations of positions up to 1 are rounded to eps/2 of 1, n eps/2 of a step, which is the error of a weight; two
-    // such positions, and as much again for weights, volumes and sums. |f_q - f_p| <= 1, 2 D weights of n^2.
+    // Separations of positions up to 1 are rounded to eps/2 of 1, n eps/2 of a step, which is the error of a weight;
+    // two such positions, and as much again for weights, volumes and sums. |f_q - f_p| <= 1, 2 D weights of n^2.
     let bound = 4.0 * (n as f64 + 4.0) * f64::EPSILON * (2 * D * n * n) as f64;
     for (found, difference) in found.iter().zip(&difference) {
         assert!((found - difference).abs() <= bound, "{D} {n}: {found} {difference}");

@@ -2,8 +2,8 @@
 
 use parops::testing::{ProviderFault, check_provider, check_provider_against};
 use parops::{
-    BruteForce, CellList, Cutoff, Domain, Face, Nearest, Neighbor, NeighborList, Neighbors, Particles, Random, Stencil,
-    VerletList,
+    BruteForce, CellList, Cutoff, Domain, Face, Nearest, Neighbor, NeighborList, Neighbors, Particles, Random,
+    Selected, Stencil, VerletList,
 };
 
 /// A provider as a user would write it: equal points on a line, found by index arithmetic.
@@ -73,6 +73,25 @@ fn our_providers_pass_on_mixed_faces() {
         let oracle = BruteForce::build(&moved, &domain, Cutoff(0.4)).unwrap();
         assert_eq!((check_provider(&verlet), check_provider_against(&verlet, &oracle)), (Ok(()), Ok(())));
     }
+}
+
+#[test]
+fn selected_targets_pass_and_keep_the_rows_of_the_others() {
+    let particles = Particles::random([0.0; 2], [1.0; 2], 150, 4).unwrap();
+    let torus = Domain::periodic([0.0; 2], [1.0; 2]).unwrap();
+    let cells = CellList::build(&particles, &torus, Cutoff(0.3)).unwrap();
+    let some = Selected::new(&cells, &[149, 3, 3, 70]).unwrap();
+    assert_eq!((some.targets(), some.sources(), some.selection()), (4, 150, &[149, 3, 3, 70][..]));
+    assert_eq!(check_provider(&some), Ok(()));
+    let (mut one, mut other) = (Stencil::default(), Stencil::default());
+    for (i, &p) in some.selection().iter().enumerate() {
+        some.gather(i, 0.2, &mut one);
+        cells.gather(p, 0.2, &mut other);
+        assert_eq!((one.target(), one.center(), one.cutoff()), (i, Some(p), 0.2));
+        assert!(one.iter().eq(other.iter()) && some.count(i, 0.2) == one.len() && !one.is_empty());
+    }
+    let error = Selected::new(&cells, &[0, 150]).unwrap_err();
+    assert_eq!(error.to_string(), "target 150 does not exist among 150");
 }
 
 #[test]
@@ -222,7 +241,7 @@ fn rows_that_change_when_asked_again_are_caught() {
     assert_eq!(check_provider(&unsteady), Err(ProviderFault::Unsteady { p: 0 }));
 }
 
-/// A sphere of points, each perturbed a hundred times with every provider built anew.
+/// A hundred random sets of four shapes and five sizes in domains of all kinds of faces, each built anew.
 fn after_updates<const D: usize, P: Neighbors<D>>(build: impl Fn(&Particles<D>, &Domain<D>, Cutoff) -> P, seed: u64) {
     const AXES: [[Face; 2]; 4] = [
         [Face::Periodic, Face::Periodic],
@@ -253,6 +272,13 @@ fn cell_lists_equal_brute_force_on_a_hundred_random_sets() {
     after_updates::<1, _>(|particles, domain, cutoff| CellList::build(particles, domain, cutoff).unwrap(), 1);
     after_updates::<2, _>(|particles, domain, cutoff| CellList::build(particles, domain, cutoff).unwrap(), 2);
     after_updates::<3, _>(|particles, domain, cutoff| CellList::build(particles, domain, cutoff).unwrap(), 3);
+}
+
+#[test]
+fn nearest_neighbors_equal_brute_force_on_a_hundred_random_sets() {
+    after_updates::<1, _>(|particles, domain, _| Nearest::build(particles, domain, 6).unwrap(), 4);
+    after_updates::<2, _>(|particles, domain, _| Nearest::build(particles, domain, 9).unwrap(), 5);
+    after_updates::<3, _>(|particles, domain, _| Nearest::build(particles, domain, 12).unwrap(), 6);
 }
 
 #[cfg(feature = "kiddo")]

@@ -21,8 +21,8 @@ fn value(z: [f64; 3]) -> f64 {
     RationalLaplacian::new().value(&z)
 }
 
-/// Int_0^inf r^n g(r) eta(r) dr by the trapezoidal rule in log r: poles are pi/10 off the axis, so a step of 1/20 leaves
-/// exp(-2 pi^2 20/10) = 7e-18, for g without fast waves.
+/// Int_0^inf r^n g(r) eta(r) dr by the trapezoidal rule in log r: poles are pi/10 off the axis, so a step of 1/20
+/// leaves exp(-2 pi^2 20/10) = 7e-18, for g without fast waves.
 fn radial(n: i32, g: impl Fn(f64) -> f64) -> f64 {
     let at = |i: i32| {
         let r = (f64::from(i) / 20.0).exp();
@@ -138,7 +138,7 @@ fn rows_bound_the_eigenvalues_by_gershgorin_where_the_sum_of_the_kernel_does_not
     let pse = Pse::<_, 1>::with_kernels([RationalLaplacian::new()], epsilon, particles.volumes()?)?.support(2.0)?;
     let torus = Domain::periodic([0.0; 3], [1.0; 3])?;
     let row = CellList::build(&particles, &torus, pse.cutoff())?;
-    let report = pse.matrix_free(&row)?.report().clone();
+    let report = *pse.matrix_free(&row)?.report();
     let spectrum = LatticeSpectrum::scan(&RationalLaplacian::new(), 0.25, 2.0)?;
     let fastest = spectrum.lambda_max * 17.0 * 17.0 / 16.0;
     // sum_q V_q eta, q = p included: what errata 26 takes for Gaussians.
@@ -242,8 +242,8 @@ mod checkers {
 
     #[test]
     fn kernel_passes_the_checker_with_limits_for_its_tail() {
-        // Beyond the support of 5 lie 2.0e-4 of the second moment, beyond the 8.75 of the quadrature 1.2e-5; at h/epsilon =
-        // 1/4 the lattice, cut off by a cube of 6.25, misses 2e-4 for its poles.
+        // Beyond the support of 5 lie 2.0e-4 of the second moment, beyond the 8.75 of the quadrature 1.2e-5; at
+        // h/epsilon = 1/4 the lattice, cut off by a cube of 6.25, misses 2e-4 for its poles.
         let limits = KernelLimits { moment: 2e-5, lattice: 4e-4, truncation: 2.1e-4 };
         check_kernel(&RationalLaplacian::new(), limits).unwrap_or_else(|fault| panic!("{fault}"));
     }

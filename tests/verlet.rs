@@ -43,7 +43,7 @@ const AXES: [[Face; 2]; 6] = [
 fn scattered<const D: usize>(shape: usize, n: usize, random: &mut Random) -> Vec<[f64; D]> {
     let place = |i: usize, x: f64| match shape {
         1 => (x * 8.0).floor() / 8.0,
-        2 if i % 6 != 0 => 0.97 + 0.02 * x,
+        2 if !i.is_multiple_of(6) => 0.97 + 0.02 * x,
         _ => x,
     };
     (0..n).map(|i| std::array::from_fn(|_| place(i, random.uniform()))).collect()

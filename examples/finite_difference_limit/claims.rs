@@ -67,6 +67,20 @@ pub fn check(records: &[Record]) -> Vec<Claim> {
         !beyond.is_empty() && beyond.iter().all(told),
         format!("beyond c = 3 the {} rows of 5.54 have a condition above {SUSPECT:.0e} or are refused", beyond.len()),
     );
+    let hats = Case::HATS.map(|case| largest(case, 1.0, 1.0));
+    let nodes: Vec<usize> = Case::HATS.into_iter().flat_map(rows).map(|record| record.neighbors).collect();
+    claim(
+        nodes == [2, 4, 6] && hats.iter().all(|&miss| miss <= f64::EPSILON),
+        format!(
+            "000, eq. 31: PSE with the hat kernel on {nodes:?} nodes is the difference to {:.0e}",
+            hats.into_iter().fold(0.0, f64::max)
+        ),
+    );
+    let shells = largest(Case::LaplacianShells, 3.0, 3.0);
+    claim(
+        shells.is_finite() && shells > f64::EPSILON,
+        format!("DC-PSE on 12 nodes is still {shells:.1e} away at c = 3, where the hat has 4 nodes and no error"),
+    );
     claim(refused(Case::FirstFourthNear), "5.54 with cutoff h, two neighbors for five conditions, is refused".into());
     claim(refused(Case::LaplacianBlock), "the Laplacian on the block of 3 x 3 is refused (errata 21)".into());
     claims

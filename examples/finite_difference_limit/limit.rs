@@ -1,8 +1,8 @@
 //! The rows on a lattice of spacing 1, and the finite differences they tend to.
 
 use parops::{
-    BruteForce, Cutoff, D1, D2, DcPse, Domain, Epsilon, ErrorKind, Laplacian, Method, Neighbors, Operator,
-    OperatorError, Particles, RowReport, Stencil,
+    BruteForce, Cutoff, D1, D2, DcPse, Domain, Epsilon, ErrorKind, Laplacian, LatticeHat, Method, Neighbors, Operator,
+    OperatorError, Particles, Pse, RowReport, Stencil, Volumes,
 };
 
 /// One stencil and operator.
@@ -20,6 +20,12 @@ pub enum Case {
     LaplacianBlock,
     /// The Laplacian of order 2 on the shells |k|^2 <= 4: rank 9.
     LaplacianShells,
+    /// PSE with the lattice hat kernel, which takes c = 1 only (000, eq. 27 to 31).
+    HatLine,
+    /// The same in two dimensions.
+    HatPlane,
+    /// The same in three dimensions.
+    HatSpace,
 }
 
 /// What became of the row.
@@ -56,14 +62,18 @@ pub struct Record {
 }
 
 impl Case {
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 9] = [
         Self::FirstSecond,
         Self::FirstFourth,
         Self::FirstFourthNear,
         Self::PlaneFirst,
         Self::LaplacianBlock,
         Self::LaplacianShells,
+        Self::HatLine,
+        Self::HatPlane,
+        Self::HatSpace,
     ];
+    pub const HATS: [Self; 3] = [Self::HatLine, Self::HatPlane, Self::HatSpace];
 
     pub fn name(self) -> &'static str {
         match self {
@@ -73,6 +83,9 @@ impl Case {
             Self::PlaneFirst => "2D d/dx r=2 3x3",
             Self::LaplacianBlock => "2D lap r=2 3x3",
             Self::LaplacianShells => "2D lap r=2 13 points",
+            Self::HatLine => "PSE hat 1D lap",
+            Self::HatPlane => "PSE hat 2D lap",
+            Self::HatSpace => "PSE hat 3D lap",
         }
     }
 
@@ -80,6 +93,7 @@ impl Case {
     fn cutoff(self) -> f64 {
         match self {
             Self::FirstSecond | Self::FirstFourthNear => 1.0,
+            Self::HatLine | Self::HatPlane | Self::HatSpace => 1.25,
             Self::FirstFourth | Self::LaplacianShells => 2.0,
             Self::PlaneFirst | Self::LaplacianBlock => 1.5,
         }
@@ -89,12 +103,8 @@ impl Case {
     fn difference(self, k: &[f64]) -> f64 {
         let off_axis = k.iter().skip(1).any(|&k| k != 0.0);
         match (self, k[0] as i32) {
-            (Self::LaplacianBlock | Self::LaplacianShells, _) => {
-                if k.iter().map(|k| k * k).sum::<f64>() == 1.0 {
-                    1.0
-                } else {
-                    0.0
-                }
+            (Self::LaplacianBlock | Self::LaplacianShells | Self::HatLine | Self::HatPlane | Self::HatSpace, _) => {
+                if k.iter().map(|k| k * k).sum::<f64>() == 1.0 { 1.0 } else { 0.0 }
             }
             (_, _) if off_axis => 0.0,
             (Self::FirstFourth | Self::FirstFourthNear, 2) => -1.0 / 12.0,
@@ -115,21 +125,37 @@ impl Case {
         Some(nodes.iter().map(|k| k[0] * window(k) / sum).collect())
     }
 
+    /// Whether the case is defined at this c.
+    pub fn takes(self, c: f64) -> bool {
+        !Self::HATS.contains(&self) || c == 1.0
+    }
+
     pub fn run(self, c: f64) -> parops::Result<Record> {
         match self {
-            Self::FirstSecond => self.row(DcPse::<D1<1>, 2>::new(), c),
-            Self::FirstFourth | Self::FirstFourthNear => self.row(DcPse::<D1<1>, 4>::new(), c),
-            Self::PlaneFirst => self.row(DcPse::<D2<1, 0>, 2>::new(), c),
-            Self::LaplacianBlock | Self::LaplacianShells => self.row(DcPse::<Laplacian<2>, 2>::new(), c),
+            Self::FirstSecond => self.corrected(DcPse::<D1<1>, 2>::new(), c),
+            Self::FirstFourth | Self::FirstFourthNear => self.corrected(DcPse::<D1<1>, 4>::new(), c),
+            Self::PlaneFirst => self.corrected(DcPse::<D2<1, 0>, 2>::new(), c),
+            Self::LaplacianBlock | Self::LaplacianShells => self.corrected(DcPse::<Laplacian<2>, 2>::new(), c),
+            Self::HatLine => self.hat::<1>(c),
+            Self::HatPlane => self.hat::<2>(c),
+            Self::HatSpace => self.hat::<3>(c),
         }
     }
 
-    /// The row of the middle particle of a lattice.
-    fn row<Op, const R: u32, const D: usize>(self, dcpse: DcPse<Op, R>, c: f64) -> parops::Result<Record>
+    fn corrected<Op, const R: u32, const D: usize>(self, dcpse: DcPse<Op, R>, c: f64) -> parops::Result<Record>
     where
         Op: Operator<D, Out = [f64; 1]>,
     {
-        let dcpse = dcpse.epsilon(Epsilon::global(1.0 / c)?).neighbors_per_condition(1.0)?;
+        self.row(&dcpse.epsilon(Epsilon::global(1.0 / c)?).neighbors_per_condition(1.0)?, c)
+    }
+
+    fn hat<const D: usize>(self, c: f64) -> parops::Result<Record> {
+        let volumes = Volumes::equal(1.0)?;
+        self.row(&Pse::<_, 1>::with_kernels([LatticeHat::<D>::new()], Epsilon::global(1.0 / c)?, &volumes)?, c)
+    }
+
+    /// The row of the middle particle of a lattice.
+    fn row<M: Method<D, Out = [f64; 1]>, const D: usize>(self, method: &M, c: f64) -> parops::Result<Record> {
         let lattice = Particles::lattice([-3.5; D], [3.5; D], [7; D])?;
         let neighbors = BruteForce::build(&lattice, &Domain::open(), Cutoff(self.cutoff()))?;
         let mut row = Stencil::default();
@@ -137,16 +163,16 @@ impl Case {
         // x_p - x_q points from the neighbor to the target.
         let nodes: Vec<[f64; D]> = row.separations().iter().map(|z| z.map(|z| -z)).collect();
 
-        let mut scratch = dcpse.scratch()?;
+        let mut scratch = method.scratch()?;
         let (mut w, mut diagonal) = (vec![[0.0]; row.len()], [0.0]);
-        let outcome = match dcpse.weights(&row, &mut scratch, &mut w, &mut diagonal) {
+        let outcome = match method.weights(&row, &mut scratch, &mut w, &mut diagonal) {
             Ok(()) => {
                 let largest = |miss: &mut dyn Iterator<Item = f64>| miss.fold(0.0, f64::max);
                 let miss = largest(&mut nodes.iter().zip(&w).map(|(k, w)| (w[0] - self.difference(k)).abs()));
                 let closed = self.closed_form(c, &nodes);
                 let from_closed_form =
                     closed.map(|closed| largest(&mut closed.iter().zip(&w).map(|(exact, w)| (w[0] - exact).abs())));
-                let report = dcpse.report(&row, &scratch, &w, &diagonal)?;
+                let report = method.report(&row, &scratch, &w, &diagonal)?;
                 Outcome::Accepted { miss, from_closed_form, report }
             }
             Err(error) => Outcome::Refused(error),
@@ -180,8 +206,11 @@ impl Record {
         match &self.outcome {
             Outcome::Accepted { miss, report, .. } => {
                 let (condition, residual) = (report.condition, report.residual);
-                let (rank, conditions) = (report.rank, report.conditions);
-                format!("{head} {condition:>10.2e} {residual:>10.2e} {miss:>10.2e}  rank {rank} of {conditions}")
+                let said = match report.conditions {
+                    0 => format!("moments miss by {:.0e}", report.moment_defect),
+                    conditions => format!("rank {} of {conditions}", report.rank),
+                };
+                format!("{head} {condition:>10.2e} {residual:>10.2e} {miss:>10.2e}  {said}")
             }
             Outcome::Refused(error) => format!("{head} {:>10} {:>10} {:>10}  {error}", "-", "-", "-"),
         }

@@ -2,6 +2,8 @@
 //! c = h/epsilon from 1 to 3.5, by how much they miss the finite differences, and what the library says of the row.
 //! Prints a table, writes `finite_difference_limit.csv` and an SVG, and exits with 1 when a claim does not hold.
 //!
+//! Beside it stands PSE with the lattice hat kernel, which is the difference itself at c = 1 (000, eq. 27 to 31).
+//!
 //! The limit is approached like exp(-c^2) where the stencil has more nodes than the difference, and the condition
 //! number grows like exp(4 c^2) where the conditions need nodes at 2 h (errata 25).
 //!
@@ -33,7 +35,7 @@ fn table(options: &Options) -> Result<bool, Box<dyn Error>> {
     let mut records = Vec::new();
     println!("{}", Record::TITLE);
     for case in Case::ALL {
-        for &c in &ratios {
+        for &c in ratios.iter().filter(|&&c| case.takes(c)) {
             let record = case.run(c)?;
             println!("{}", record.row());
             records.push(record);

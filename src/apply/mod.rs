@@ -1,11 +1,13 @@
 //! Operators applied to fields: stored rows, or weights made anew for every application.
 
+mod advect;
 mod assemble;
 pub(crate) mod blocks;
 mod composed;
 mod export;
 mod fields;
 mod histogram;
+mod hyperviscosity;
 mod matrix_free;
 mod moving;
 mod pairs;
@@ -13,23 +15,29 @@ mod report;
 mod rows;
 #[cfg(feature = "serde")]
 mod saved;
+mod sided;
 mod splice;
 mod strided;
 mod sweep;
 mod symmetric;
 mod upwind;
+mod upwind_dcpse;
 mod vector;
 mod worker;
 
+pub use advect::Advect;
 pub use export::RawRows;
 pub use histogram::Histogram;
+pub use hyperviscosity::Hyperviscosity;
 pub use matrix_free::MatrixFree;
 pub use moving::MovingMethod;
 pub use report::Report;
 pub use rows::{Row, Rows};
+pub use sided::SidedRows;
 pub use strided::Strided;
 pub use symmetric::SymmetricPse;
 pub use upwind::UpwindRows;
+pub use upwind_dcpse::UpwindDcPse;
 pub use vector::Vector;
 
 use num_traits::AsPrimitive;

@@ -70,6 +70,15 @@ kinds! {
             /// The relative residual asked for.
             tolerance: f64,
         } => "relative residual {residual:e} after {iterations} iterations is above {tolerance:e}",
+        /// Modes that grow faster than they may, whatever the strength of the stabilization.
+        Growing {
+            /// The estimated rate of growth.
+            abscissa: f64,
+            /// The largest legal rate.
+            limit: f64,
+            /// The strongest stabilization tried.
+            gamma: f64,
+        } => "modes grow at the rate {abscissa:e}, above {limit:e}, even with gamma = {gamma}",
         /// A setting out of range.
         Setting {
             /// The value.

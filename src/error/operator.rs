@@ -34,6 +34,24 @@ kinds! {
             /// Number of neighbors on the other side and beside the target.
             neighbors: usize,
         } => "axis {axis}: none of the {neighbors} neighbors is on the {side}",
+        /// Too few neighbors on one side, or in places that do not determine a derivative.
+        ThinSide {
+            /// Axis of the derivative.
+            axis: usize,
+            /// The side.
+            side: Side,
+            /// Number of neighbors of the stencil on that side.
+            neighbors: usize,
+            /// Number of moment conditions.
+            conditions: usize,
+        } => "axis {axis}: the {neighbors} neighbors on the {side} do not determine the {conditions} moment conditions",
+        /// Rows of a lower order than an operator made of them needs.
+        LowOrder {
+            /// The order of the rows; 0 where they state none.
+            found: u32,
+            /// The order needed.
+            needed: u32,
+        } => "the rows have order {found} where {needed} is needed",
         /// An odd image, for rows that tell the side of a source from the sign of its weight.
         OddImage {
             /// The source whose image it is.

@@ -1,9 +1,10 @@
 //! The exchange kernel of an anisotropic second-order operator: a quadratic form times a Gaussian.
 
+use super::decay::decay;
 use super::{Kernel, gaussian_constant};
 use crate::error::{KernelError, Result};
 use crate::multi_index::{Term, common_degree};
-use crate::scalar::{Scalar, square};
+use crate::scalar::Scalar;
 
 /// The exchange kernel of sum_ij A_ij d_i d_j to order 2,
 /// eta(z) = 4 pi^(-D/2) (z . m z) exp(-|z|^2), m = A - tr(A)/(D + 2) I.
@@ -69,7 +70,8 @@ impl<T: Scalar, const D: usize> Kernel<T, D> for AnisotropicGaussian<D> {
                 sum += x * T::lift(m) * y;
             }
         }
-        sum * (-square(z)).exp()
+        let (_, [decay]) = decay(&[*z], 1.0);
+        sum * decay
     }
 
     fn terms(&self) -> &[Term<D>] {

@@ -1,8 +1,8 @@
 //! Radial smoothing kernels of compact support: piecewise polynomials in r = |z|, with all the derivatives they have.
 //!
-//! As a function of s = |z|^2 the profile w has the derivatives g_m = (d/ds)^m w = ((1/2r) d/dr)^m w, and D^beta W is a sum
-//! of z^(beta - 2k) g_(|beta| - |k|). Each g_m is kept as a sum of parts (edge - r)^a r^-b P(r) in which nothing cancels at
-//! the edge, and b is the true pole at r = 0: it is lower than the degree of the z^(beta - 2k) it meets.
+//! As a function of s = |z|^2 the profile w has the derivatives g_m = (d/ds)^m w = ((1/2r) d/dr)^m w, and D^beta W is a
+//! sum of z^(beta - 2k) g_(|beta| - |k|). Each g_m is kept as a sum of parts (edge - r)^a r^-b P(r) in which nothing
+//! cancels at the edge, and b is the true pole at r = 0: it is lower than the degree of the z^(beta - 2k) it meets.
 
 use super::BLOCK;
 use super::exchange::horner;
@@ -220,8 +220,8 @@ fn sphere<const D: usize>() -> f64 {
     (dimension..D).step_by(2).fold(first, |area, d| area * TAU / d as f64)
 }
 
-/// The traits of a kernel that is a tuple struct around a [`Compact`] and has a constant `OVERLAP_LIMITS` for D = 1, 2, 3;
-/// the expression says whether it is positive definite.
+/// The traits of a kernel that is a tuple struct around a [`Compact`] and has a constant `OVERLAP_LIMITS` for D = 1, 2,
+/// 3; the expression says whether it is positive definite.
 macro_rules! compact_kernel {
     ($name:ident, $definite:expr) => {
         impl<const D: usize> Default for $name<D> {

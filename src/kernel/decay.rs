@@ -36,13 +36,27 @@ pub(super) fn in_lanes<T: Scalar, const D: usize>(
     }
 }
 
+/// out times exp(-|z|^2).
+#[inline(always)]
+pub(super) fn damp<T: Scalar, const D: usize>(z: &[[T; D]], out: &mut [T]) {
+    let ((z, z_rest), (out, out_rest)) = (z.as_chunks::<LANES>(), out.as_chunks_mut::<LANES>());
+    for (z, out) in z.iter().zip(out) {
+        let (_, decay) = decay(z, 1.0);
+        *out = array::from_fn(|i| out[i] * decay[i]);
+    }
+    for (z, out) in z_rest.iter().zip(out_rest) {
+        let (_, [decay]) = decay(&[*z], 1.0);
+        *out *= decay;
+    }
+}
+
 /// |z|^2, rounded once, and exp(-a |z|^2) within 2 units in the last place, for a = 1, 1/2 or 1/4.
 ///
 /// In `f64` the bits depend neither on L nor on the target.
 #[inline(always)]
 pub(super) fn decay<T: Scalar, const D: usize, const L: usize>(z: &[[T; D]; L], a: f64) -> ([T; L], [T; L]) {
     let (high, low) = squares(z);
-    let a = T::lift(a);
+    let a = T::lift(-a);
     (array::from_fn(|i| high[i] + low[i]), exponential(high.map(|high| a * high), low.map(|low| a * low)))
 }
 
@@ -52,11 +66,11 @@ fn squares<T: Scalar, const D: usize, const L: usize>(z: &[[T; D]; L]) -> ([T; L
     let shift = T::lift(grid::<T>());
     let (mut high, mut low) = ([T::zero(); L], [T::zero(); L]);
     for axis in 0..D {
+        let x = z.map(|z| z[axis]);
         for i in 0..L {
-            let x = z[i][axis];
-            let h = (x + shift) - shift;
+            let h = (x[i] + shift) - shift;
             high[i] += h * h;
-            low[i] += (x - h) * (x + h);
+            low[i] += (x[i] - h) * (x[i] + h);
         }
     }
     (high, low)
@@ -78,20 +92,20 @@ fn grid<T: Scalar>() -> f64 {
     if T::default_epsilon() < T::lift(1e-10) { 1.5 * 2_147_483_648.0 } else { 1.5 * 65_536.0 }
 }
 
-/// exp(-high - low).
+/// exp(high + low).
 #[inline(always)]
 fn exponential<T: Scalar, const L: usize>(high: [T; L], low: [T; L]) -> [T; L] {
     let (any_high, any_low): (&dyn Any, &dyn Any) = (&high, &low);
     if let (Some(&high), Some(&low)) = (any_high.downcast_ref(), any_low.downcast_ref()) {
-        return exp_of_sum(Lanes::ZERO - Lanes(high), Lanes::ZERO - Lanes(low)).0.map(T::lift);
+        return exp_of_sum(Lanes(high), Lanes(low)).0.map(T::lift);
     }
     array::from_fn(|i| {
         let sum = high[i] + low[i];
         // The low part of an infinite square is no number.
         if !sum.is_finite() {
-            return (-high[i]).exp();
+            return high[i].exp();
         }
-        let value = (-sum).exp();
-        value - value * ((high[i] - sum) + low[i])
+        let value = sum.exp();
+        value + value * ((high[i] - sum) + low[i])
     })
 }

@@ -1,8 +1,8 @@
 //! Smoothing kernels of order above 2: the identity kernels, a polynomial times exp(-|z|^2).
 
-use super::decay::{decay, in_lanes};
+use super::decay::{damp, decay, in_lanes};
 use super::exchange::{Exchange, horner, radial_profile};
-use super::{BLOCK, Kernel, SmoothingKernel, gaussian_constant};
+use super::{Kernel, SmoothingKernel, gaussian_constant};
 use crate::error::{KernelError, Result};
 use crate::multi_index::{MultiIndex, Term};
 use crate::scalar::{Scalar, square};
@@ -118,7 +118,8 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for HighOrderGaussian<D> {
     }
 
     fn combination(&self, terms: &[Term<D>], z: &[[T; D]], out: &mut [T]) -> Result<()> {
-        for &Term { index, .. } in terms {
+        out.fill(T::zero());
+        for &Term { index, factor } in terms {
             let degree = index.degree();
             if degree > Self::DERIVATIVE_LIMIT {
                 return Err(KernelError::Regularity {
@@ -128,32 +129,22 @@ impl<T: Scalar, const D: usize> SmoothingKernel<T, D> for HighOrderGaussian<D> {
                 }
                 .into());
             }
+            for_each_half(index, |halves, taken| {
+                let radial = self.differentiated(degree - taken);
+                let radial = &radial[..self.coefficients];
+                let mut front = T::lift(factor);
+                let mut exponents = index.exponents();
+                for (n, &k) in exponents.iter_mut().zip(halves) {
+                    front *= T::lift(constant(*n, k));
+                    *n -= 2 * k;
+                }
+                let monomial = MultiIndex::new(exponents);
+                for (z, out) in z.iter().zip(&mut *out) {
+                    *out += front * monomial.power(z) * horner(radial, square(z));
+                }
+            });
         }
-        in_lanes(z, out, |z| decay(z, 1.0).1);
-        let mut sums = [T::zero(); BLOCK];
-        for (z, out) in z.chunks(BLOCK).zip(out.chunks_mut(BLOCK)) {
-            let sums = &mut sums[..z.len()];
-            sums.fill(T::zero());
-            for &Term { index, factor } in terms {
-                for_each_half(index, |halves, taken| {
-                    let radial = self.differentiated(index.degree() - taken);
-                    let radial = &radial[..self.coefficients];
-                    let mut front = T::lift(factor);
-                    let mut exponents = index.exponents();
-                    for (n, &k) in exponents.iter_mut().zip(halves) {
-                        front *= T::lift(constant(*n, k));
-                        *n -= 2 * k;
-                    }
-                    let monomial = MultiIndex::new(exponents);
-                    for (z, sum) in z.iter().zip(&mut *sums) {
-                        *sum += front * monomial.power(z) * horner(radial, square(z));
-                    }
-                });
-            }
-            for (out, &sum) in out.iter_mut().zip(&*sums) {
-                *out *= sum;
-            }
-        }
+        damp(z, out);
         Ok(())
     }
 

@@ -8,12 +8,12 @@ use crate::scalar::Scalar;
 /// only**.
 ///
 /// There its discrete moments sum_j j^alpha eta(j) are those of the operator: 2 for alpha = 2 along an axis, 0 for the
-/// others of degree 1 to 3. Unit steps have the weight 1 and all others 0, so PSE is the finite difference
-/// h^-2 sum_i (f(x + h e_i) - 2 f(x) + f(x - h e_i)). Elsewhere it is wrong: the integral of z_i^2 eta is 8/3, 32/15, 64/45 for
-/// D = 1, 2, 3 instead of 2, and rows of scattered sets are refused for their moments.
+/// others of degree 1 to 3. Unit steps have the weight 1 and all others 0, so PSE is the finite difference h^-2 sum_i
+/// (f(x + h e_i) - 2 f(x) + f(x - h e_i)). Elsewhere it is wrong: the integral of z_i^2 eta is 8/3, 32/15, 64/45 for D
+/// = 1, 2, 3 instead of 2, and rows of scattered sets are refused for their moments.
 ///
-/// The support is 5/4: no lattice point lies between 1 and sqrt(2), so the cutoff keeps the 2 D unit steps alone. The overlap
-/// limit is 1. The row bound on eigenvalues, 4 D/h^2, is that of the finite difference and sharp.
+/// The support is 5/4: no lattice point lies between 1 and sqrt(2), so the cutoff keeps the 2 D unit steps alone. The
+/// overlap limit is 1. The row bound on eigenvalues, 4 D/h^2, is that of the finite difference and sharp.
 ///
 /// ```
 /// use parops::{Apply, CellList, Domain, LatticeHat, Particles, Pse, Spacing};

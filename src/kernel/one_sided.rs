@@ -1,11 +1,12 @@
 //! One-sided kernels: a first or higher derivative along one axis from the sources on one side alone.
 
+use super::decay::decay;
 use super::exchange::{Exchange, horner};
 use super::twofold::{Twofold, solve};
 use super::{Kernel, gaussian_constant};
 use crate::error::{KernelError, Result};
 use crate::multi_index::{MultiIndex, Term};
-use crate::scalar::{Scalar, square};
+use crate::scalar::Scalar;
 use crate::stencil::Side;
 
 /// The largest degree plus order of a one-sided kernel.
@@ -141,7 +142,8 @@ impl<T: Scalar, const D: usize> Kernel<T, D> for OneSidedGaussian<D> {
                 product *= horner(&self.across, x * x);
             }
         }
-        product * (-square(z)).exp()
+        let (_, [decay]) = decay(&[*z], 1.0);
+        product * decay
     }
 
     fn terms(&self) -> &[Term<D>] {

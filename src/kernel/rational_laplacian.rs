@@ -16,8 +16,8 @@ use crate::scalar::Scalar;
 ///   [`lost`](Self::lost); 2e-4 at the support 5, where a Gaussian has lost nothing.
 /// - Its poles lie 0.309 off the real axis, so lattices are poor quadratures: with cutoff 5 the second moment is off by
 ///   -0.04, -1.9, +4.7 % at h/epsilon = 1/4, 1/2, 0.8. The overlap limit is 1/4.
-/// - Its transform has negative parts: the fastest mode decays with 7.786/epsilon^2, above M_0. It is not
-///   positive definite, rows bound their eigenvalues by Gershgorin, and Euler is stable to 0.2569 epsilon^2 (integral form),
+/// - Its transform has negative parts: the fastest mode decays with 7.786/epsilon^2, above M_0. It is not positive
+///   definite, rows bound their eigenvalues by Gershgorin, and Euler is stable to 0.2569 epsilon^2 (integral form),
 ///   0.2545 on a lattice with h/epsilon = 1/2.
 ///
 /// ```
@@ -29,7 +29,8 @@ use crate::scalar::Scalar;
 /// ```
 ///
 /// Source: notes 001, sec. 5.2.1 (the kernel); errata 8 (moments, lattice, limits) and 26 (which bound does not apply).
-/// See also: [`WideGaussian`](crate::WideGaussian) and [`Exchange`](crate::Exchange), more accurate with fewer neighbors.
+/// See also: [`WideGaussian`](crate::WideGaussian) and [`Exchange`](crate::Exchange), more accurate with fewer
+/// neighbors.
 #[derive(Clone, Debug)]
 pub struct RationalLaplacian([Term<3>; 3]);
 

@@ -8,14 +8,15 @@ use crate::scalar::Scalar;
 
 /// The cubic spline W(z) = sigma ((2 - r)_+^3 - 4 (1 - r)_+^3), r = |z|, (x)_+ = max(x, 0); of order 2.
 ///
-/// sigma = 1/6, 5/(14 pi), 1/(4 pi) for D = 1, 2, 3; any D is normalized. epsilon is the distance between the knots, so the
-/// support radius is 2 epsilon. Twice continuously differentiable: D^beta W exists to |beta| = 2. Value and derivatives
-/// are within a few eps of their absolute terms, which do not cancel at z = 0, at the knots or at the edge.
+/// sigma = 1/6, 5/(14 pi), 1/(4 pi) for D = 1, 2, 3; any D is normalized. epsilon is the distance between the knots, so
+/// the support radius is 2 epsilon. Twice continuously differentiable: D^beta W exists to |beta| = 2. Value and
+/// derivatives are within a few eps of their absolute terms, which do not cancel at z = 0, at the knots or at the edge.
 ///
-/// Overlap: h/epsilon from 0.65 to 0.85 is customary (epsilon of 1.2 to 1.5 spacings). Up to the limit of 1 a sum over a
-/// lattice is 1 to 0.5 %; to 0.56 it is to 0.1 %. Weakness: from D = 2 on the transform is negative for some waves. Below
-/// h/epsilon = 0.65 or so particles moved by its pressure forces then clump in pairs, which [`WendlandC2`](crate::WendlandC2)
-/// does not do.
+/// Overlap: h/epsilon of 0.77 to 0.85 is customary (epsilon of 1.2 to 1.3 spacings). Up to the limit of 1 a sum over a
+/// lattice is 1 to 0.5 %, up to 0.56 to 0.1 %. Weakness: from D = 2 on the transform is negative for some waves, and
+/// particles that move along -grad sum_q W form pairs where the overlap is large: in two dimensions from epsilon = 1.3 h
+/// on (measured: the least gap of a square lattice falls to 0.4 h at 1.3 h and to 0 at 1.5 h).
+/// [`WendlandC2`](crate::WendlandC2) does not pair.
 ///
 /// ```
 /// use parops::{CubicSpline, ErrorKind, Kernel, KernelError, MultiIndex, SmoothingKernel};
@@ -34,15 +35,17 @@ use crate::scalar::Scalar;
 #[derive(Clone, Debug)]
 pub struct CubicSpline<const D: usize>(Compact<D>);
 
-/// The quintic spline W(z) = sigma ((3 - r)_+^5 - 6 (2 - r)_+^5 + 15 (1 - r)_+^5), r = |z|, (x)_+ = max(x, 0); of order 2.
+/// The quintic spline W(z) = sigma ((3 - r)_+^5 - 6 (2 - r)_+^5 + 15 (1 - r)_+^5), r = |z|, (x)_+ = max(x, 0); of order
+/// 2.
 ///
-/// sigma = 1/120, 7/(478 pi), 1/(120 pi) for D = 1, 2, 3; any D is normalized. epsilon is the distance between the knots, so
-/// the support radius is 3 epsilon. Four times continuously differentiable: D^beta W exists to |beta| = 4. Value and
-/// derivatives are within a few eps of their absolute terms, which do not cancel at z = 0, at the knots or at the edge.
+/// sigma = 1/120, 7/(478 pi), 1/(120 pi) for D = 1, 2, 3; any D is normalized. epsilon is the distance between the
+/// knots, so the support radius is 3 epsilon. Four times continuously differentiable: D^beta W exists to |beta| = 4.
+/// Value and derivatives are within a few eps of their absolute terms, which do not cancel at z = 0, at the knots or at
+/// the edge.
 ///
-/// Overlap: up to the limit of 1 a sum over a lattice is 1 to 2e-4; second derivatives want 0.8. It has 3.4 times the
-/// neighbors of [`CubicSpline`] in three dimensions. Weakness: from D = 2 on the transform is negative for some waves, as
-/// for the cubic spline, but pairs form only at smaller h/epsilon.
+/// Overlap: up to the limit of 1 a sum over a lattice is 1 to 3e-4. It has 3.4 times the neighbors of [`CubicSpline`]
+/// in three dimensions. Weakness: from D = 2 on the transform is negative for some waves; in two dimensions pairs form
+/// at epsilon of 1.4 to 1.6 h (measured as for the cubic spline: least gaps of 0.3 and 0.1 h).
 ///
 /// ```
 /// use parops::{Kernel, QuinticSpline};
@@ -83,8 +86,8 @@ compact_kernel!(QuinticSpline, D == 1);
 
 /// The B-spline of odd degree n, sum_j (-1)^j C(n + 1, j) (R - j - r)_+^n, R = (n + 1)/2.
 ///
-/// Below r = 1 the truncated powers are expanded: there their odd powers of r below n cancel exactly, which would be the
-/// poles of their derivatives.
+/// Below r = 1 the truncated powers are expanded: there their odd powers of r below n cancel exactly, which would be
+/// the poles of their derivatives.
 fn spline<const D: usize>(name: &'static str, n: u32) -> Compact<D> {
     let reach = n.div_ceil(2);
     let mut whole = Vec::new();

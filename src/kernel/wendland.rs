@@ -6,18 +6,17 @@ use crate::error::Result;
 use crate::multi_index::{MultiIndex, Term};
 use crate::scalar::Scalar;
 
-/// The Wendland function C2, W(z) = sigma (1 - q)_+^4 (1 + 4q) for D = 2, 3 and sigma (1 - q)_+^3 (1 + 3q) for D = 1, with
-/// q = |z|/2; of order 2.
+/// The Wendland function C2, W(z) = sigma (1 - q)_+^4 (1 + 4q) for D = 2, 3 and sigma (1 - q)_+^3 (1 + 3q) for D = 1,
+/// with q = |z|/2; of order 2.
 ///
-/// sigma = 5/8, 7/(4 pi), 21/(16 pi) for D = 1, 2, 3; any D is normalized.
-/// The support radius is 2 epsilon, so epsilon is half of the H of the source. Twice times continuously differentiable:
-/// D^beta W exists to |beta| = 2. Value and derivatives are within a few eps of their absolute terms, which have one sign
-/// but for powers of z.
+/// sigma = 5/8, 7/(4 pi), 21/(16 pi) for D = 1, 2, 3; any D is normalized. The support radius is 2 epsilon, so epsilon
+/// is half of the H of the source. Twice continuously differentiable: D^beta W exists to |beta| = 2. Value and
+/// derivatives are within a few eps of their absolute terms, which have one sign but for powers of z.
 ///
-/// Overlap: up to the limit, h/epsilon = 0.93, 0.76, 0.77 for D = 1, 2, 3, a sum over a lattice is 1 to 1 %; to 0.47 it is to 0.1 %.
-/// Positive definite in D dimensions: no pairing for any number of neighbors. Weakness: at equal epsilon it is narrower than the
-/// splines and its sums over few neighbors are worse.
-/// For D >= 4 the power grows as Wendland's theorem asks, the limit is that of D = 3.
+/// Overlap: up to the limit, h/epsilon = 0.93, 0.76, 0.77 for D = 1, 2, 3, a sum over a lattice is 1 to 1 %; to 0.47 it
+/// is to 0.1 %. Positive definite in D dimensions: no pairing for any number of neighbors. Weakness: at equal epsilon
+/// it is narrower than the splines and its sums over few neighbors are worse. For D >= 4 the power grows as Wendland's
+/// theorem asks, the limit is that of D = 3.
 ///
 /// ```
 /// use parops::{Kernel, SmoothingKernel, WendlandC2};
@@ -35,15 +34,14 @@ pub struct WendlandC2<const D: usize>(Compact<D>);
 /// The Wendland function C4, W(z) = sigma (1 - q)_+^6 (1 + 6q + 35/3 q^2) for D = 2, 3 and sigma (1 - q)_+^5
 /// (1 + 5q + 8q^2) for D = 1, with q = |z|/2; of order 2.
 ///
-/// sigma = 3/4, 9/(4 pi), 495/(256 pi) for D = 1, 2, 3; any D is normalized.
-/// The support radius is 2 epsilon, so epsilon is half of the H of the source. Four times continuously differentiable:
-/// D^beta W exists to |beta| = 4. Value and derivatives are within a few eps of their absolute terms, which have one sign
-/// but for powers of z.
+/// sigma = 3/4, 9/(4 pi), 495/(256 pi) for D = 1, 2, 3; any D is normalized. The support radius is 2 epsilon, so
+/// epsilon is half of the H of the source. Four times continuously differentiable: D^beta W exists to |beta| = 4. Value
+/// and derivatives are within a few eps of their absolute terms, which have one sign but for powers of z.
 ///
-/// Overlap: up to the limit, h/epsilon = 1, 0.79, 0.79 for D = 1, 2, 3, a sum over a lattice is 1 to 1 %; to 0.56 it is to 0.1 %.
-/// Positive definite in D dimensions: no pairing for any number of neighbors. Weakness: as for C2, it wants more neighbors than a
-/// spline of the same epsilon.
-/// For D >= 4 the power grows as Wendland's theorem asks, the limit is that of D = 3.
+/// Overlap: up to the limit, h/epsilon = 1, 0.79, 0.79 for D = 1, 2, 3, a sum over a lattice is 1 to 1 %; to 0.56 it is
+/// to 0.1 %. Positive definite in D dimensions: no pairing for any number of neighbors. Weakness: as for C2, it wants
+/// more neighbors than a spline of the same epsilon. For D >= 4 the power grows as Wendland's theorem asks, the limit
+/// is that of D = 3.
 ///
 /// ```
 /// use parops::{Kernel, WendlandC4};
@@ -58,15 +56,14 @@ pub struct WendlandC4<const D: usize>(Compact<D>);
 /// The Wendland function C6, W(z) = sigma (1 - q)_+^8 (1 + 8q + 25q^2 + 32q^3) for D = 2, 3 and sigma (1 - q)_+^7
 /// (1 + 7q + 19q^2 + 21q^3) for D = 1, with q = |z|/2; of order 2.
 ///
-/// sigma = 55/64, 39/(14 pi), 1365/(512 pi) for D = 1, 2, 3; any D is normalized.
-/// The support radius is 2 epsilon, so epsilon is half of the H of the source. Six times continuously differentiable:
-/// D^beta W exists to |beta| = 6. Value and derivatives are within a few eps of their absolute terms, which have one sign
-/// but for powers of z.
+/// sigma = 55/64, 39/(14 pi), 1365/(512 pi) for D = 1, 2, 3; any D is normalized. The support radius is 2 epsilon, so
+/// epsilon is half of the H of the source. Six times continuously differentiable: D^beta W exists to |beta| = 6. Value
+/// and derivatives are within a few eps of their absolute terms, which have one sign but for powers of z.
 ///
-/// Overlap: up to the limit, h/epsilon = 0.93, 0.77, 0.75 for D = 1, 2, 3, a sum over a lattice is 1 to 1 %; to 0.58 it is to 0.1 %.
-/// Positive definite in D dimensions: no pairing for any number of neighbors. Weakness: as for C2; at equal epsilon the narrowest of
-/// the three.
-/// For D >= 4 the power grows as Wendland's theorem asks, the limit is that of D = 3.
+/// Overlap: up to the limit, h/epsilon = 0.93, 0.77, 0.75 for D = 1, 2, 3, a sum over a lattice is 1 to 1 %; to 0.58 it
+/// is to 0.1 %. Positive definite in D dimensions: no pairing for any number of neighbors. Weakness: as for C2; at
+/// equal epsilon the narrowest of the three. For D >= 4 the power grows as Wendland's theorem asks, the limit is that
+/// of D = 3.
 ///
 /// ```
 /// use parops::{Kernel, MultiIndex, SmoothingKernel, WendlandC6};
@@ -124,11 +121,11 @@ compact_kernel!(WendlandC2, true);
 compact_kernel!(WendlandC4, true);
 compact_kernel!(WendlandC6, true);
 
-/// (1 - q)^(l + k) P(q), q = r/2, with l = floor(D/2) + k + 1, the least for which it is positive definite; P of degree k
-/// is a function of l.
+/// (1 - q)^(l + k) P(q), q = r/2, with l = floor(D/2) + k + 1, the least for which it is positive definite; P of degree
+/// k is a function of l.
 ///
-/// Kept as (2 - r)^(l + k) P(r/2). The operator (1/r) d/dr turns it into a multiple of the same with k less by one, so all
-/// parts of derivatives have coefficients of one sign.
+/// Kept as (2 - r)^(l + k) P(r/2). The operator (1/r) d/dr turns it into a multiple of the same with k less by one, so
+/// all parts of derivatives have coefficients of one sign.
 fn wendland<const D: usize>(name: &'static str, k: u32, polynomial: impl Fn(f64) -> Vec<f64>) -> Compact<D> {
     let l = D as u32 / 2 + k + 1;
     let mut coefficients = polynomial(f64::from(l));

@@ -6,11 +6,14 @@ use super::stop::{SolveReport, Stop, check_right, check_solution};
 use crate::apply::Apply;
 use crate::error::{LinearError, Result};
 
+/// How often a cycle that broke down and gained nothing is tried again with another shadow.
+const RETRIES: u32 = 3;
+
 /// BiCGSTAB: two products an iteration and eight vectors, however many iterations it takes.
 ///
 /// The preconditioner stands on the right, so that the residual is the true one. The recurrence only proposes: where it
 /// says that the tolerance is reached, or breaks down, the residual is computed anew from x and decides; a cycle that
-/// raised it is taken back. The start is x = 0, and b is scaled by a power of two, so that equal input gives equal bits
+/// raised it is taken back, and tried again with another shadow vector up to three times. The start is x = 0, and b is scaled by a power of two, so that equal input gives equal bits
 /// and 2^k b gives 2^k x. It allocates in the first solve of a size only.
 ///
 /// Defaults: at most 3000 products, relative residual 1e-13.
@@ -137,19 +140,25 @@ impl BiCgStab {
             left = norm(&self.residual);
             x.iter_mut().for_each(|x| *x *= scale);
         }
-        let mut products = 0;
+        let (mut products, mut retries) = (0, 0);
         while left > 0.0 && (left > goal || products == 0) && products < self.stop.most {
             self.kept.copy_from_slice(x);
+            self.choose_shadow(left, retries);
             let reached = self.cycle(goal, &mut products, &product, &precondition, x)?;
             let before = left;
             left = self.true_residual(&product, x)?;
+            // Where the recurrence arrived and the residual stays, what is left is rounding.
+            let gained = left < if reached { 0.5 * before } else { before };
             if !(left <= before) {
                 x.copy_from_slice(&self.kept);
-                left = before;
+                left = self.true_residual(&product, x)?;
             }
-            // Where the recurrence arrived and the residual stays, what is left is rounding.
-            if !(left < if reached { 0.5 * before } else { before }) {
+            if gained {
+                retries = 0;
+            } else if reached || retries == RETRIES {
                 break;
+            } else {
+                retries += 1;
             }
         }
         x.iter_mut().for_each(|x| *x /= scale);
@@ -161,6 +170,17 @@ impl BiCgStab {
         let Self { residual, shadow, direction, images: [first, second], work, scaled, kept, .. } = self;
         for vector in [residual, shadow, direction, first, second, work, scaled, kept] {
             vector.resize(n, 0.0);
+        }
+    }
+
+    /// The residual itself, of norm `length`, or, where it broke down, itself and a dense vector of about that length.
+    fn choose_shadow(&mut self, length: f64, retries: u32) {
+        let Self { shadow, residual, .. } = self;
+        let spread = if retries == 0 { 0.0 } else { length * (12.0 / residual.len() as f64).sqrt() };
+        for (i, (shadow, r)) in shadow.iter_mut().zip(residual).enumerate() {
+            // A sequence of low discrepancy in place of random numbers.
+            let uniform = ((i + 1) as f64 * f64::from(retries) * 0.618_033_988_749_895).fract() - 0.5;
+            *shadow = *r + spread * uniform;
         }
     }
 
@@ -183,9 +203,8 @@ impl BiCgStab {
         x: &mut [f64],
     ) -> Result<bool> {
         let Self { stop, residual: r, shadow, direction, images: [image, second], work, .. } = self;
-        shadow.copy_from_slice(r);
         direction.copy_from_slice(r);
-        let start = norm(r);
+        let start = norm(shadow);
         let mut along = dot(shadow, r);
         while *products < stop.most {
             work.copy_from_slice(direction);
@@ -207,7 +226,9 @@ impl BiCgStab {
             precondition(work)?;
             product(work, second)?;
             *products += 1;
-            let omega = dot(second, r) / dot(second, second);
+            // Divided twice, so that no square leaves the range of numbers.
+            let length = norm(second);
+            let omega = dot(second, r) / length / length;
             if !(omega.is_finite() && omega != 0.0) {
                 return Ok(false);
             }

@@ -91,7 +91,7 @@ impl Gmres {
     /// [`LinearError::NotSquare`] and [`LinearError::Length`] where shapes do not fit; [`LinearError::Value`] naming the
     /// first entry of `b` that is not finite; [`LinearError::NotConverged`] where the residual is above the tolerance
     /// after the last iteration, or when a restart no longer lowers it (`x` then holds what was reached);
-    /// [`ApplyError::Overflow`] where the solution is not finite; and the errors of the operator.
+    /// [`ApplyError::Overflow`](crate::ApplyError::Overflow) where the solution is not finite; and the errors of the operator.
     pub fn solve(
         &mut self,
         a: &(impl Apply<f64> + ?Sized),

@@ -19,6 +19,7 @@ mod shifted;
 mod solver;
 mod spectrum;
 mod stop;
+mod tuning;
 
 pub use bicgstab::BiCgStab;
 pub use csr::CsrMatrix;
@@ -28,3 +29,4 @@ pub(crate) use matrix_market::Counted;
 pub use solver::SparseSolver;
 pub use spectrum::{Spectrum, SpectrumEstimator};
 pub use stop::SolveReport;
+pub use tuning::Tuning;

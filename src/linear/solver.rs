@@ -151,8 +151,9 @@ impl SparseSolver {
     /// Solves A x = b; `x` is written whole. b = 0 gives x = 0.
     ///
     /// # Errors
-    /// [`LinearError::Length`] for a vector of another length; [`LinearError::Value`] naming the first entry of `b` that
-    /// is not finite, scaled like its row; [`LinearError::NotConverged`] where the residual stays above its bound, `x`
+    /// [`LinearError::Length`](crate::LinearError::Length) for a vector of another length;
+    /// [`LinearError::Value`](crate::LinearError::Value) naming the first entry of `b` that is not finite, scaled like its
+    /// row; [`LinearError::NotConverged`](crate::LinearError::NotConverged) where the residual stays above its bound, `x`
     /// then holds what was reached; [`ApplyError::Overflow`](crate::ApplyError::Overflow) where the solution is not finite.
     pub fn solve(&mut self, b: &[f64], x: &mut [f64]) -> Result<SolveReport> {
         self.solve_from(b, x, |x| x.fill(0.0))

@@ -68,9 +68,9 @@ fn rotate<const D: usize>(a: &mut [[f64; D]; D], i: usize, j: usize) {
     for row in a.iter_mut() {
         (row[i], row[j]) = (cosine * row[i] - sine * row[j], sine * row[i] + cosine * row[j]);
     }
-    for k in 0..D {
-        let (x, y) = (a[i][k], a[j][k]);
-        (a[i][k], a[j][k]) = (cosine * x - sine * y, sine * x + cosine * y);
+    let (upper, lower) = a.split_at_mut(j);
+    for (x, y) in upper[i].iter_mut().zip(&mut lower[0]) {
+        (*x, *y) = (cosine * *x - sine * *y, sine * *x + cosine * *y);
     }
 }
 

@@ -115,6 +115,10 @@ impl<V: Velocity<D>, X: Transport<D>, W: FlowDivergence<D>, const D: usize, E: F
         Some(built.rows.report())
     }
 
+    fn monotone(&self, built: &Self::Rows) -> bool {
+        W::ZERO && built.rows.monotone()
+    }
+
     fn velocity(&self, p: usize, x: &[f64; D], t: f64) -> Option<[f64; D]> {
         Some(self.velocity.at(p, x, t))
     }
@@ -158,7 +162,12 @@ impl<V, X, W> Advection<V, X, W> {
             if let Some(axis) = v.iter().position(|v| !v.is_finite()) {
                 return Err(Error::from(SolverError::Velocity { axis, value: v[axis], t }).at(p));
             }
-            advection = advection.larger(rows.rate(p, &v).map_err(|error| error.at(p))?);
+            match rows.rate(p, &v) {
+                Ok(rate) => advection = advection.larger(rate),
+                // No row is needed where a value is given at this moment.
+                Err(_) if site.comes_in(p, &v) => continue,
+                Err(error) => return Err(error.at(p)),
+            }
             hyperviscosity = hyperviscosity.larger(rows.hyperviscosity(p, &v));
         }
         Ok([advection, hyperviscosity])

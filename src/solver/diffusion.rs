@@ -87,6 +87,10 @@ impl<C: Diffusivity<D>, M: Method<D, Out = [f64; 1]> + Clone, const D: usize, E:
         rows.rows.entries_of(p, |w| rows.factor * w[0], entry);
     }
 
+    fn monotone(&self, rows: &DiffusionRows<E>) -> bool {
+        rows.rows.report().negative_weights == 0
+    }
+
     fn report<'a>(&self, rows: &'a DiffusionRows<E>) -> Option<&'a Report> {
         Some(rows.rows.report())
     }

@@ -86,7 +86,7 @@ pub trait Edge<const D: usize, E: Fields>: Sync {
         neighbors: &P,
     ) -> Result<Self::State>;
 
-    /// Writes the boundary values of time t into u.
+    /// Writes the boundary values of time t into u; with `zero` those of the same conditions with g = 0.
     ///
     /// # Errors
     /// As [`BoundaryRows::impose`].
@@ -96,6 +96,7 @@ pub trait Edge<const D: usize, E: Fields>: Sync {
         site: &Site<D>,
         flow: &dyn Fn(usize, f64) -> Option<[f64; D]>,
         t: f64,
+        zero: bool,
         u: &mut [E],
     ) -> Result<()>;
 
@@ -107,6 +108,9 @@ pub trait Edge<const D: usize, E: Fields>: Sync {
 
     /// Calls `particle` for every particle whose value is prescribed at time t.
     fn each_prescribed(&self, flow: &dyn Fn(usize, f64) -> Option<[f64; D]>, t: f64, particle: &mut dyn FnMut(usize));
+
+    /// Whether no condition is about a flux: prescribed values let no mode grow that would not without them.
+    fn values_only(&self) -> bool;
 
     /// The rows of the conditions and the value of each, for steady problems.
     fn rows<'a>(&self, state: &'a Self::State) -> Option<&'a BoundaryRows>;
@@ -135,6 +139,7 @@ impl<const D: usize, E: Fields> Edge<D, E> for () {
         _: &Site<D>,
         _: &dyn Fn(usize, f64) -> Option<[f64; D]>,
         _: f64,
+        _: bool,
         _: &mut [E],
     ) -> Result<()> {
         Ok(())
@@ -147,6 +152,10 @@ impl<const D: usize, E: Fields> Edge<D, E> for () {
     fn give_back((): &mut (), _: Vec<E>) {}
 
     fn each_prescribed(&self, _: &dyn Fn(usize, f64) -> Option<[f64; D]>, _: f64, _: &mut dyn FnMut(usize)) {}
+
+    fn values_only(&self) -> bool {
+        true
+    }
 
     fn rows<'a>(&self, (): &'a ()) -> Option<&'a BoundaryRows> {
         None
@@ -203,6 +212,7 @@ impl<G: Fn(usize, &[f64; D], f64) -> E + Sync, const D: usize, E: Fields> Edge<D
             };
             return Err(Error::from(kind).at(p));
         }
+        site.open(inflow);
         let rows = BoundaryRows::build(conditions, *order, neighbors)?;
         site.prescribe(conditions.iter().map(BoundaryCondition::particle));
         if steady {
@@ -217,10 +227,12 @@ impl<G: Fn(usize, &[f64; D], f64) -> E + Sync, const D: usize, E: Fields> Edge<D
         site: &Site<D>,
         flow: Flow<'_, D>,
         t: f64,
+        zero: bool,
         u: &mut [E],
     ) -> Result<()> {
         let points = site.points();
-        let g = |p: usize| points.get(p).map_or(E::ZERO, |x| (self.values)(p, x, t));
+        let given = |p: usize| points.get(p).map_or(E::ZERO, |x| (self.values)(p, x, t));
+        let g = |p: usize| if zero { E::ZERO } else { given(p) };
         for (i, &(p, _)) in self.boundary.inflow.iter().enumerate() {
             if self.comes_in(i, flow, t) {
                 let value = g(p);
@@ -263,6 +275,10 @@ impl<G: Fn(usize, &[f64; D], f64) -> E + Sync, const D: usize, E: Fields> Edge<D
                 particle(p);
             }
         }
+    }
+
+    fn values_only(&self) -> bool {
+        self.boundary.conditions.iter().all(|condition| condition.factors().1 == 0.0)
     }
 
     fn rows<'a>(&self, state: &'a BoundedState<E>) -> Option<&'a BoundaryRows> {

@@ -52,7 +52,8 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     /// Makes the rows of the scene on these particles; the run starts at t = 0.
     ///
     /// # Errors
-    /// As [`SemiDiscrete::new`]; [`SolverError::Unstable`] where no step is stable for a term, such as explicit Euler with
+    /// As [`SemiDiscrete::new`]; [`SolverError::Growing`] where modes grow whatever the step, as those of central schemes on
+    /// scattered particles without enough diffusion; [`SolverError::Unstable`] where no step is stable for a term, such as explicit Euler with
     /// a central scheme for the advection.
     pub fn new<P: Neighbors<D>>(scene: S, particles: &Particles<D>, neighbors: &P, stepper: St) -> Result<Self> {
         Self::with_policy(scene, particles, neighbors, stepper, StepPolicy::default(), GrowthPolicy::default())
@@ -72,6 +73,13 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     ) -> Result<Self> {
         let mut discrete = SemiDiscrete::new(scene, particles, neighbors, growth)?;
         let mut ledger = LedgerRow::new(S::Value::FIELDS);
+        if growth != GrowthPolicy::Unknown {
+            let spectrum = discrete.spectrum(0.0)?;
+            ledger.growth = match growth {
+                GrowthPolicy::Allow => spectrum.abscissa,
+                _ => SemiDiscrete::<D, S>::check_growth(&spectrum)?,
+            };
+        }
         for report in discrete.reports() {
             ledger.condition = ledger.condition.max(report.condition);
             ledger.residual = ledger.residual.max(report.residual);
@@ -258,7 +266,7 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
 
     /// Cuts a step into substeps, each within the limit of its moment, and says how many.
     fn cut(&mut self, u: &mut Vec<S::Value>, dt: f64, mut limits: Limits) -> Result<u32> {
-        let StepPolicy::Adapt { most } = self.steps else { return Ok(0) };
+        let most = if let StepPolicy::Adapt { most } = self.steps { most } else { 0 };
         let (mut t, end, mut done) = (self.t, self.t + dt, 0);
         loop {
             let rest = end - t;

@@ -5,10 +5,11 @@ use super::flow::Flow;
 use super::ledger::{LedgerRow, Totals};
 use super::limits::{Limits, Rate};
 use super::moving::{Moving, MovingScene, MovingState, wrapped};
-use super::moving_diffusion::{ListSettings, MovingDiffusion};
-use super::policy::StepPolicy;
+use super::moving_diffusion::{MovingDiffusion, MovingSettings};
+use super::policy::{GrowthPolicy, StepPolicy};
 use super::remeshing::{Nodes, Remesher, Remeshing, Trigger, check, overlap_is_lost};
 use super::saved::SavedParticles;
+use super::semi_discrete::SemiDiscrete;
 use crate::apply::Report;
 use crate::domain::Domain;
 use crate::error::{Limit, Result, SolverError, TimeError};
@@ -74,25 +75,26 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
     /// # Errors
     /// [`ParticleError::NoVolumes`](crate::ParticleError::NoVolumes) without volumes; [`TimeError::Shape`] for another
     /// number of values; [`DomainError::Outside`](crate::DomainError::Outside) naming a particle outside the domain; as
-    /// [`MovingDiffusion::start`] and [`MovingDiffusion::check`]; [`SolverError::Unstable`] where no step is stable for a
-    /// term.
+    /// [`MovingDiffusion::start`], [`MovingDiffusion::check`] and [`MovingDiffusion::spectrum`];
+    /// [`SolverError::Unstable`] where no step is stable for a term; [`SolverError::Growing`] where modes of the diffusion
+    /// term grow.
     pub fn new(scene: S, particles: &Particles<D>, u: &[S::Value], domain: &Domain<D>, stepper: St) -> Result<Self> {
-        Self::with_list(scene, particles, u, domain, stepper, ListSettings::default())
+        Self::with_settings(scene, particles, u, domain, stepper, MovingSettings::default())
     }
 
-    /// The same with a cutoff and a skin of the neighbor list of one's own.
+    /// The same with settings for the neighbor list and for modes that grow.
     ///
     /// # Errors
     /// As [`new`](Self::new).
-    pub fn with_list(
+    pub fn with_settings(
         scene: S,
         particles: &Particles<D>,
         u: &[S::Value],
         domain: &Domain<D>,
         stepper: St,
-        list: ListSettings,
+        settings: MovingSettings,
     ) -> Result<Self> {
-        let (mut moving, state) = Moving::new(scene, particles, u, domain, list)?;
+        let (mut moving, state) = Moving::new(scene, particles, u, domain, settings)?;
         let (limits, report) = moving.limits(0.0, &state, COURANT)?;
         limits.possible(&stepper)?;
         if report.is_some() {
@@ -113,6 +115,13 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
             work,
             values: Vec::new(),
         };
+        if report.is_some() && settings.growth != GrowthPolicy::Unknown {
+            let spectrum = run.moving.spectrum()?;
+            run.ledger.growth = match settings.growth {
+                GrowthPolicy::Allow => spectrum.abscissa,
+                _ => SemiDiscrete::<D, S>::check_growth(&spectrum)?,
+            };
+        }
         run.certify(report.as_ref());
         run.measure();
         run.start = run.ledger.fields.iter().map(|field| field.mass).collect();

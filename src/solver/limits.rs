@@ -10,24 +10,37 @@ pub struct Rate {
     pub decay: f64,
     /// Bound on |Im(lambda)|, in 1/time.
     pub oscillation: f64,
+    /// Bound on |lambda| of modes left of the imaginary axis, wherever there, in 1/time.
+    pub modulus: f64,
     /// One over the longest step that any stepper may take, in 1/time; 0 where there is none.
     pub frequency: f64,
 }
 
+/// The half-disc left of the imaginary axis that lies in the stability region, in units of the shorter interval: 0.939 for
+/// RK4, 1.001 for SSP-RK3.
+const HALF_DISC: f64 = 0.93;
+
 impl Rate {
+    const NONE: Self = Self { decay: 0.0, oscillation: 0.0, modulus: 0.0, frequency: 0.0 };
+
     /// Modes that only decay.
     pub const fn decay(decay: f64) -> Self {
-        Self { decay, oscillation: 0.0, frequency: 0.0 }
+        Self { decay, ..Self::NONE }
     }
 
     /// Modes that only oscillate.
     pub const fn oscillation(oscillation: f64) -> Self {
-        Self { decay: 0.0, oscillation, frequency: 0.0 }
+        Self { oscillation, ..Self::NONE }
+    }
+
+    /// Modes that decay and oscillate in any proportion.
+    pub const fn modulus(modulus: f64) -> Self {
+        Self { modulus, ..Self::NONE }
     }
 
     /// A longest step, given as one over it.
     pub const fn frequency(frequency: f64) -> Self {
-        Self { decay: 0.0, oscillation: 0.0, frequency }
+        Self { frequency, ..Self::NONE }
     }
 
     /// The larger of each.
@@ -36,6 +49,7 @@ impl Rate {
         Self {
             decay: self.decay.max(other.decay),
             oscillation: self.oscillation.max(other.oscillation),
+            modulus: self.modulus.max(other.modulus),
             frequency: self.frequency.max(other.frequency),
         }
     }
@@ -44,13 +58,14 @@ impl Rate {
 /// The rates of all terms at one moment, from the actual rows.
 ///
 /// With x the negative real and y the imaginary interval of a stepper, modes that decay at up to a = sum_i a_i and
-/// oscillate at up to b = sum_i b_i are stable for
+/// oscillate at up to b = sum_i b_i, or lie anywhere to the left within c = sum_i c_i of zero, are stable for
 ///
 /// ```text
-/// dt (a/x + b/y) <= 1
+/// dt (a/x + b/y + c/(0.93 min(x, y))) <= 1
 /// ```
 ///
-/// because the triangle between the ends of both intervals lies in the stability region (checked for Rk4 and SSP-RK3).
+/// because the triangle between the ends of both intervals and that half-disc lie in the stability regions of RK4 and
+/// SSP-RK3, which are star-shaped.
 /// With one term alone that is its own sharp limit; of several, the one with the largest share binds. A term that
 /// oscillates has no legal step where y = 0, as for explicit Euler (notes 001, eq. 6.25).
 ///
@@ -75,6 +90,7 @@ impl Limits {
         let own = &mut self.rates[limit as usize];
         own.decay += rate.decay;
         own.oscillation += rate.oscillation;
+        own.modulus += rate.modulus;
         own.frequency = own.frequency.max(rate.frequency);
     }
 
@@ -143,7 +159,8 @@ impl Limits {
     pub fn possible_within(&self, intervals: impl Fn(Limit) -> (f64, f64)) -> Result<()> {
         let impossible = |&limit: &Limit| share(self.rate(limit), intervals(limit)).is_infinite();
         let Some(term) = Limit::ALL.into_iter().find(impossible) else { return Ok(()) };
-        let (Rate { decay, oscillation, .. }, (negative_real, imaginary)) = (self.rate(term), intervals(term));
+        let (Rate { decay, oscillation, modulus, .. }, (negative_real, imaginary)) = (self.rate(term), intervals(term));
+        let (decay, oscillation) = (decay + modulus, oscillation + modulus);
         Err(SolverError::Unstable { term, decay, oscillation, negative_real, imaginary }.into())
     }
 }
@@ -154,8 +171,8 @@ fn of<S: State>(stepper: &(impl Stepper<S> + ?Sized)) -> impl Fn(Limit) -> (f64,
     move |_| intervals
 }
 
-/// a/x + b/y, in 1/time.
+/// a/x + b/y + c/(0.93 min(x, y)), in 1/time.
 fn share(rate: Rate, (x, y): (f64, f64)) -> f64 {
     let part = |rate: f64, interval: f64| if rate > 0.0 { rate / interval } else { 0.0 };
-    part(rate.decay, x) + part(rate.oscillation, y)
+    part(rate.decay, x) + part(rate.oscillation, y) + part(rate.modulus, HALF_DISC * x.min(y))
 }

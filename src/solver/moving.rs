@@ -3,16 +3,17 @@
 use super::fields::Fields;
 use super::flow::Flow;
 use super::limits::{Limits, Rate};
-use super::moving_diffusion::{ListSettings, MovingDiffusion};
+use super::moving_diffusion::{MovingDiffusion, MovingSettings};
 use super::scene::Scene;
 use super::term::{SceneTerm, Site};
 use crate::apply::Report;
 use crate::apply::blocks::each_row;
 use crate::domain::Domain;
 use crate::error::{Error, Limit, Result, SolverError, TimeError};
+use crate::linear::Spectrum;
 use crate::particles::{Particles, Random};
 use crate::scale::Volumes;
-use crate::time::{Entry, Symmetry};
+use crate::time::{Entry, RowSymmetry};
 
 /// What a stepper moves: positions, and strengths and volumes. What a scene leaves as it is has no entries in it.
 pub type MovingState<const D: usize, E> = (Vec<[f64; D]>, (Vec<E>, Vec<f64>));
@@ -75,7 +76,7 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         particles: &Particles<D>,
         u: &[S::Value],
         domain: &Domain<D>,
-        list: ListSettings,
+        settings: MovingSettings,
     ) -> Result<(Self, MovingState<D, S::Value>)> {
         let (found, needed) = (u.len(), particles.len());
         if found != needed {
@@ -88,7 +89,7 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         let points = wrapped(particles.points(), domain)?;
         let mut particles = particles.clone();
         particles.set_points(&points)?;
-        let kept = scene.diffusion_term().start(&particles, domain, list)?;
+        let kept = scene.diffusion_term().start(&particles, domain, settings)?;
         let mut moving = Self {
             scene,
             domain: *domain,
@@ -268,8 +269,13 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         Ok((limits, checked.map(|(report, _)| report)))
     }
 
+    /// The rightmost eigenvalue and the spectral radius of the diffusion rows of now.
+    pub(super) fn spectrum(&self) -> Result<Spectrum> {
+        self.scene.diffusion_term().spectrum(&self.kept, &self.site)
+    }
+
     /// Whether V_p w_pq = V_q w_qp in the rows of now, found by applying them to two fields.
-    pub(super) fn symmetry(&self, state: &MovingState<D, S::Value>) -> Result<Symmetry> {
+    pub(super) fn symmetry(&self, state: &MovingState<D, S::Value>) -> Result<RowSymmetry> {
         /// Rounding of a row and of the sum over all, in eps of the absolute terms; rows of DC-PSE miss it by percents.
         const ROUNDING: f64 = 1e4;
         let (points, mut random) = (self.site.points(), Random::new(1));
@@ -294,7 +300,7 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
             size += ab.abs() + ba.abs();
         }
         let symmetric = defect.abs() <= ROUNDING * S::Value::EPSILON * size;
-        Ok(if symmetric { Symmetry::Symmetric } else { Symmetry::General })
+        Ok(if symmetric { RowSymmetry::Symmetric } else { RowSymmetry::General })
     }
 }
 

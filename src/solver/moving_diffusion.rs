@@ -3,11 +3,13 @@
 use super::coefficient::{Diffusivity, diffusivities};
 use super::diffusion::{Diffusion, check_contrast};
 use super::fields::Fields;
+use super::policy::GrowthPolicy;
 use super::term::Site;
 use crate::apply::blocks::each_row;
-use crate::apply::{MatrixFree, MovingMethod, Report};
+use crate::apply::{Apply, MatrixFree, MovingMethod, Report, Rows};
 use crate::domain::{Domain, Face};
 use crate::error::{ParticleError, Result};
+use crate::linear::{Spectrum, SpectrumEstimator};
 use crate::neighbors::{Neighbors, VerletList};
 use crate::operator::{DivGrad, Method};
 use crate::particles::Particles;
@@ -18,14 +20,16 @@ use crate::stencil::{Neighbor, Stencil};
 /// The skin of the neighbor list over its reach, where the caller names none.
 const SKIN: f64 = 0.15;
 
-/// How the neighbors of moving particles are kept.
+/// How the neighbors of moving particles are kept, and what is done about modes that grow.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
-pub struct ListSettings {
+pub struct MovingSettings {
     /// The cutoff of the rows; by default that of the method.
     pub cutoff: Option<f64>,
     /// The skin of the list; by default 0.15 of its reach, or less in a narrow domain.
     pub skin: Option<f64>,
+    /// What is done about modes of the diffusion term that grow on the set of the start; later sets are not looked at.
+    pub growth: GrowthPolicy,
 }
 
 /// What the diffusion term of a scene is to particles that move. The unit type is no diffusion, and keeps no list.
@@ -52,7 +56,7 @@ pub trait MovingDiffusion<const D: usize, E: Fields>: Sync {
     ///
     /// # Errors
     /// As [`VerletList::build`] and [`MovingMethod::reach`]; [`ParticleError::Diffusivity`] for an illegal diffusivity.
-    fn start(&self, particles: &Particles<D>, domain: &Domain<D>, list: ListSettings) -> Result<Self::Kept>;
+    fn start(&self, particles: &Particles<D>, domain: &Domain<D>, settings: MovingSettings) -> Result<Self::Kept>;
 
     /// The same with the cutoffs of what is kept, for other particles, as search number `searches`.
     ///
@@ -78,6 +82,13 @@ pub trait MovingDiffusion<const D: usize, E: Fields>: Sync {
     /// # Errors
     /// Naming the particle whose row is illegal.
     fn check(&self, kept: &Self::Kept, site: &Site<D>) -> Result<Option<(Report, f64)>>;
+
+    /// The rightmost eigenvalue and the spectral radius of the rows of now; zero without a product where no weight is
+    /// negative.
+    ///
+    /// # Errors
+    /// As [`Rows::assemble`] and [`SpectrumEstimator::estimate`].
+    fn spectrum(&self, kept: &Self::Kept, site: &Site<D>) -> Result<Spectrum>;
 
     /// Writes `finish`(p, div(D grad u)_p) for every particle.
     ///
@@ -112,7 +123,7 @@ impl<const D: usize, E: Fields> MovingDiffusion<D, E> for () {
         Ok(())
     }
 
-    fn start(&self, _: &Particles<D>, _: &Domain<D>, _: ListSettings) -> Result<()> {
+    fn start(&self, _: &Particles<D>, _: &Domain<D>, _: MovingSettings) -> Result<()> {
         Ok(())
     }
 
@@ -130,6 +141,10 @@ impl<const D: usize, E: Fields> MovingDiffusion<D, E> for () {
 
     fn check(&self, (): &(), _: &Site<D>) -> Result<Option<(Report, f64)>> {
         Ok(None)
+    }
+
+    fn spectrum(&self, (): &(), _: &Site<D>) -> Result<Spectrum> {
+        Ok(Spectrum::default())
     }
 
     fn rates(
@@ -182,13 +197,18 @@ impl<C: Diffusivity<D>, M: MovingMethod<D>, const D: usize, E: Fields> MovingDif
         self.diffusivity.validate(particles)
     }
 
-    fn start(&self, particles: &Particles<D>, domain: &Domain<D>, list: ListSettings) -> Result<MovingRows<D, M>> {
+    fn start(
+        &self,
+        particles: &Particles<D>,
+        domain: &Domain<D>,
+        settings: MovingSettings,
+    ) -> Result<MovingRows<D, M>> {
         if let Some(diffusivity) = self.diffusivity.constant()
             && !(diffusivity >= 0.0 && diffusivity.is_finite())
         {
             return Err(ParticleError::Diffusivity { diffusivity }.into());
         }
-        let [cutoff, reach] = match list.cutoff {
+        let [cutoff, reach] = match settings.cutoff {
             Some(cutoff) => [cutoff; 2],
             None => self.method.reach(particles, domain)?.map(|cutoff| cutoff.0),
         };
@@ -197,7 +217,7 @@ impl<C: Diffusivity<D>, M: MovingMethod<D>, const D: usize, E: Fields> MovingDif
         let closed = domain.faces().map(|faces| faces.iter().all(|&face| face != Face::Open));
         let narrowest = widths.iter().zip(closed).filter(|&(_, closed)| closed);
         let room = narrowest.fold(f64::INFINITY, |room, (width, _)| room.min(0.499 * width));
-        let skin = list.skin.unwrap_or((SKIN * reach).min(0.5 * (room - cutoff)).max(0.0));
+        let skin = settings.skin.unwrap_or((SKIN * reach).min(0.5 * (room - cutoff)).max(0.0));
         let reach = reach.min(room - skin).max(cutoff);
         let list = VerletList::build(particles, domain, Cutoff(reach), skin)?;
         let mut method = self.method.clone();
@@ -236,6 +256,17 @@ impl<C: Diffusivity<D>, M: MovingMethod<D>, const D: usize, E: Fields> MovingDif
         Ok(Some((report, factor)))
     }
 
+    fn spectrum(&self, kept: &MovingRows<D, M>, site: &Site<D>) -> Result<Spectrum> {
+        let within = kept.within();
+        match self.diffusivity.constant() {
+            Some(factor) => spectrum(&kept.method, &within, factor),
+            None => {
+                let values = diffusivities(&self.diffusivity, site.points())?;
+                spectrum(&DivGrad::new(kept.method.clone(), values)?.mean(self.mean), &within, 1.0)
+            }
+        }
+    }
+
     fn rates(
         &self,
         kept: &MovingRows<D, M>,
@@ -258,6 +289,26 @@ impl<C: Diffusivity<D>, M: MovingMethod<D>, const D: usize, E: Fields> MovingDif
     fn searches<'a>(&self, kept: &'a MovingRows<D, M>) -> (u64, &'a [[f64; D]]) {
         (kept.earlier + kept.list.rebuilds() as u64, kept.list.searched_at())
     }
+}
+
+/// Products after which an estimate of the spectrum is taken as it is.
+const MOST: usize = 1000;
+
+/// The spectrum of the rows times a factor, from rows that are stored for it.
+fn spectrum<const D: usize, M: Method<D, Out = [f64; 1]>>(
+    method: &M,
+    neighbors: &Within<'_, D>,
+    factor: f64,
+) -> Result<Spectrum> {
+    let rows = Rows::<[f64; 1]>::assemble(method, neighbors)?;
+    if rows.report().negative_weights == 0 {
+        return Ok(Spectrum::default());
+    }
+    SpectrumEstimator::new().most(MOST).estimate(neighbors.targets(), |u, du| {
+        rows.apply(u, du)?;
+        du.iter_mut().for_each(|du| *du *= factor);
+        Ok(())
+    })
 }
 
 /// `finish`(p, factor sum_q w_pq (u_q - u_p)), row after row, without storing any.

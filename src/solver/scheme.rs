@@ -4,7 +4,7 @@ use super::fields::Fields;
 use super::scene::Scene;
 use super::semi_discrete::SemiDiscrete;
 use crate::error::{Limit, Result};
-use crate::time::{Euler, Implicit, Leapfrog, Rk4, SspRk3, Stepper, Symmetry};
+use crate::time::{Euler, Implicit, Leapfrog, Rk4, RowSymmetry, SspRk3, Stepper};
 
 /// What moves a scene in time. Every [`Stepper`] does, and [`ImplicitScheme`].
 pub trait TimeScheme<const D: usize, S: Scene<D>> {
@@ -15,7 +15,7 @@ pub trait TimeScheme<const D: usize, S: Scene<D>> {
     ///
     /// # Errors
     /// As [`Stepper::check_symmetry`].
-    fn check_symmetry(&self, symmetry: Symmetry) -> Result<()> {
+    fn check_symmetry(&self, symmetry: RowSymmetry) -> Result<()> {
         let _ = symmetry;
         Ok(())
     }
@@ -35,7 +35,7 @@ impl<St: Stepper<Vec<S::Value>>, S: Scene<D>, const D: usize> TimeScheme<D, S> f
         (self.negative_real_interval(), self.imaginary_interval())
     }
 
-    fn check_symmetry(&self, symmetry: Symmetry) -> Result<()> {
+    fn check_symmetry(&self, symmetry: RowSymmetry) -> Result<()> {
         Stepper::check_symmetry(self, symmetry)
     }
 

@@ -13,7 +13,7 @@ use crate::error::{Result, TimeError};
 use crate::linear::CsrMatrix;
 use crate::neighbors::Neighbors;
 use crate::particles::{Particles, Random};
-use crate::time::Symmetry;
+use crate::time::RowSymmetry;
 
 /// A scene on a particle set: its rows, made once, and du/dt at any time. Absent terms take no room in it.
 ///
@@ -91,24 +91,44 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
             return Err(TimeError::Shape { found, needed }.into());
         }
         if !<S::Edge as Edge<D, S::Value>>::PRESENT {
-            return self.inside(t, u, du);
+            return self.inside::<true>(t, u, du);
         }
         let mut room = S::Edge::room(&mut self.edge);
         room.clear();
         room.extend_from_slice(u);
-        let done = self.impose(t, &mut room).and_then(|()| self.inside(t, &room, du));
+        let done = self.impose(t, &mut room).and_then(|()| self.inside::<true>(t, &room, du));
         S::Edge::give_back(&mut self.edge, room);
         done?;
+        self.hold(t, du);
+        Ok(())
+    }
+
+    /// du/dt of the diffusion and advection terms with boundary conditions whose values are zero, which are written into u.
+    pub(super) fn linear(&mut self, t: f64, u: &mut [S::Value], du: &mut [S::Value]) -> Result<()> {
+        self.impose_values(t, true, u)?;
+        self.inside::<false>(t, u, du)?;
+        self.hold(t, du);
+        Ok(())
+    }
+
+    /// Sets the rates of prescribed values to zero.
+    fn hold(&self, t: f64, du: &mut [S::Value]) {
         self.each_prescribed(t, |p| {
             if let Some(du) = du.get_mut(p) {
                 *du = S::Value::ZERO;
             }
         });
-        Ok(())
     }
 
-    /// du/dt of a field that has its boundary values.
-    fn inside(&mut self, t: f64, u: &[S::Value], du: &mut [S::Value]) -> Result<()> {
+    /// Whether no term can have a growing mode, because none has a negative weight.
+    pub(super) fn cannot_grow(&self) -> bool {
+        let terms = self.scene.diffusion_term().monotone(&self.diffusion)
+            && self.scene.advection_term().monotone(&self.advection);
+        terms && self.scene.edge().values_only()
+    }
+
+    /// du/dt of a field that has its boundary values, with or without the source.
+    fn inside<const SOURCE: bool>(&mut self, t: f64, u: &[S::Value], du: &mut [S::Value]) -> Result<()> {
         let Self { scene, site, diffusion, advection, source, .. } = self;
         scene.diffusion_term().refresh(diffusion, site, t, u)?;
         scene.advection_term().refresh(advection, site, t, u)?;
@@ -120,7 +140,7 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
             let x = &points[p];
             let rate = k.rate(diffusion, p, x, t, u, S::Value::ZERO);
             let rate = a.rate(advection, p, x, t, u, rate);
-            s.rate(source, p, x, t, u, rate)
+            if SOURCE { s.rate(source, p, x, t, u, rate) } else { rate }
         });
         Ok(())
     }
@@ -130,10 +150,14 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
     /// # Errors
     /// As [`Edge::impose`].
     pub fn impose(&mut self, t: f64, u: &mut [S::Value]) -> Result<()> {
+        self.impose_values(t, false, u)
+    }
+
+    fn impose_values(&mut self, t: f64, zero: bool, u: &mut [S::Value]) -> Result<()> {
         let Self { scene, site, edge, .. } = self;
         let points = site.points();
         let flow = |p: usize, t: f64| points.get(p).and_then(|x| scene.advection_term().velocity(p, x, t));
-        scene.edge().impose(edge, site, &flow, t, u)
+        scene.edge().impose(edge, site, &flow, t, zero, u)
     }
 
     fn each_prescribed(&self, t: f64, mut particle: impl FnMut(usize)) {
@@ -220,7 +244,7 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
 
     /// Whether V_p w_pq = V_q w_qp in the rows of the diffusion term, found by applying them to two fields; a boundary
     /// breaks it. Without a diffusion term there is nothing to break.
-    pub fn symmetry(&self) -> Symmetry {
+    pub fn symmetry(&self) -> RowSymmetry {
         let points = self.site.points();
         let volumes = self.site.particles().volumes().ok();
         let volume = |p: usize| volumes.and_then(|volumes| volumes.get(p).ok()).unwrap_or(1.0);
@@ -245,7 +269,7 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
             size += ab.abs() + ba.abs();
         }
         let tolerance = ROUNDING * S::Value::EPSILON * size;
-        if defect.abs() <= tolerance { Symmetry::Symmetric } else { Symmetry::General }
+        if defect.abs() <= tolerance { RowSymmetry::Symmetric } else { RowSymmetry::General }
     }
 
     /// The largest numerical viscosity of order 1 at time t, in the units of a diffusivity; 0 for schemes of higher order.

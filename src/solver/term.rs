@@ -13,6 +13,8 @@ pub struct Site<const D: usize> {
     particles: Particles<D>,
     /// Empty where no value is prescribed.
     prescribed: Vec<bool>,
+    /// Particles with outward normals where the flow may come in.
+    inflow: Vec<(usize, [f64; D])>,
 }
 
 impl<const D: usize> Site<D> {
@@ -31,12 +33,12 @@ impl<const D: usize> Site<D> {
         if rows != set {
             return Err(crate::error::ApplyError::Stale { rows, set }.into());
         }
-        Ok(Self { particles: particles.clone(), prescribed: Vec::new() })
+        Ok(Self { particles: particles.clone(), prescribed: Vec::new(), inflow: Vec::new() })
     }
 
     /// These particles, which will move.
     pub(super) fn moving(particles: Particles<D>) -> Self {
-        Self { particles, prescribed: Vec::new() }
+        Self { particles, prescribed: Vec::new(), inflow: Vec::new() }
     }
 
     /// The particles, to be moved.
@@ -69,6 +71,17 @@ impl<const D: usize> Site<D> {
                 *prescribed = true;
             }
         }
+    }
+
+    /// Says where the flow may come in.
+    pub(super) fn open(&mut self, inflow: &[(usize, [f64; D])]) {
+        self.inflow.extend_from_slice(inflow);
+    }
+
+    /// Whether a velocity v comes in at particle p, where an inflow condition stands.
+    pub(super) fn comes_in(&self, p: usize, v: &[f64; D]) -> bool {
+        let inward = |normal: &[f64; D]| v.iter().zip(normal).fold(0.0, |sum, (v, n)| sum + v * n) < 0.0;
+        self.inflow.iter().any(|(q, normal)| *q == p && inward(normal))
     }
 
     /// Every particle with its point, the prescribed ones left out.
@@ -106,7 +119,8 @@ pub trait SceneTerm<const D: usize, E: Fields>: Sync {
         Ok(())
     }
 
-    /// Adds the share of this term in du_p/dt to `rate`, for particle p at x.
+    /// Adds the share of this term in du_p/dt to `rate`, for particle p at x; p and u are of the set the rows were made for,
+    /// which [`SemiDiscrete`](crate::SemiDiscrete) checks once for all particles.
     fn rate(&self, rows: &Self::Rows, p: usize, x: &[f64; D], t: f64, u: &[E], rate: E) -> E;
 
     /// Adds what bounds the step at this time.
@@ -121,6 +135,12 @@ pub trait SceneTerm<const D: usize, E: Fields>: Sync {
 
     /// What the build of the rows found.
     fn report<'a>(&self, rows: &'a Self::Rows) -> Option<&'a Report>;
+
+    /// Whether no weight on a neighbor is negative in the matrix of this term, so that none of its modes grows.
+    fn monotone(&self, rows: &Self::Rows) -> bool {
+        let _ = rows;
+        true
+    }
 
     /// The velocity at particle p, which is at x; `None` for a term that has none.
     fn velocity(&self, p: usize, x: &[f64; D], t: f64) -> Option<[f64; D]> {

@@ -11,7 +11,8 @@ use crate::neighbors::Neighbors;
 ///
 /// [`Pse`](crate::Pse), [`Sph`](crate::Sph) and [`DcPse`](crate::DcPse) of the gradient are central schemes, and so is any
 /// other method inside [`Central`](crate::Central); [`UpwindGradient`](crate::UpwindGradient) is the upwind scheme of
-/// order 1.
+/// order 1, [`UpwindDcPse`](crate::UpwindDcPse) those of order 2 and 3, and [`Stabilized`](crate::Stabilized) is central with
+/// hyperviscosity.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is no advection scheme in {D} dimensions",
     label = "expected a method for the gradient or an upwind scheme",
@@ -68,6 +69,11 @@ pub trait TransportRows<const D: usize, E: Fields>: Send + Sync {
     fn hyperviscosity(&self, p: usize, v: &[f64; D]) -> Rate {
         let _ = (p, v);
         Rate::default()
+    }
+
+    /// Whether no weight of -v . grad on a neighbor is negative, for any v.
+    fn monotone(&self) -> bool {
+        false
     }
 
     /// The divergence of a velocity field at particle p, by central rows; `None` where the scheme has none.

@@ -108,6 +108,10 @@ impl<const D: usize, E: Fields> TransportRows<D, E> for OneSidedRows<D, E> {
         Ok(Rate::decay(2.0 * v.iter().zip(&self.sums).fold(0.0, |sum, (v, own)| sum + v.abs() * own)))
     }
 
+    fn monotone(&self) -> bool {
+        true
+    }
+
     fn report(&self) -> &Report {
         self.rows.report()
     }

@@ -22,7 +22,8 @@ pub struct KernelLimits {
 }
 
 impl Default for KernelLimits {
-    /// 1e-10, 1e-4 and 1e-5, which all kernels of this crate keep.
+    /// 1e-10, 1e-4 and 1e-5, which all kernels of this crate with an exponential keep. The lattice sums of compact kernels
+    /// are good to 1e-2 at their overlap limit, and a rational kernel loses more outside its support.
     fn default() -> Self {
         Self { moment: 1e-10, lattice: 1e-4, truncation: 1e-5 }
     }

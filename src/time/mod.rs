@@ -27,7 +27,7 @@ pub use leapfrog::Leapfrog;
 pub use limit::{Binding, Policy, StepLimit};
 pub use plan::Plan;
 pub use rk4::Rk4;
-pub use rkl2::{Rkl2, Symmetry};
+pub use rkl2::{Rkl2, RowSymmetry};
 pub use ssp_rk3::SspRk3;
 pub use state::State;
 pub use stepper::{Rhs, Stepper};

@@ -16,7 +16,7 @@ const MOST_GENERAL: u32 = 40;
 
 /// What is known of the rows of an operator, and with it of how far its eigenvalues lie from the real axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Symmetry {
+pub enum RowSymmetry {
     /// Symmetric, or similar to symmetric: V_p w_pq = V_q w_qp, as in [`Pse`](crate::Pse) with one epsilon. All
     /// eigenvalues are real.
     Symmetric,
@@ -46,10 +46,10 @@ pub enum Symmetry {
 /// that of a single step: by less than 100 eps in 1000 stages.
 ///
 /// ```
-/// use parops::{Plan, Rkl2, StepLimit, Symmetry, integrate};
+/// use parops::{Plan, Rkl2, StepLimit, RowSymmetry, integrate};
 /// // 1000 explicit Euler steps, in one step of 63 stages.
 /// let limit = StepLimit::from_spectral_bound(2000.0, 1.0)?;
-/// let mut rkl2 = Rkl2::for_decay(&limit, 1.0, Symmetry::Symmetric)?;
+/// let mut rkl2 = Rkl2::for_decay(&limit, 1.0, RowSymmetry::Symmetric)?;
 /// assert_eq!((rkl2.stages(), rkl2.substeps()), (63, 1));
 /// let mut u = [1.0, 1.0];
 /// let decay = |_: f64, u: &[f64; 2], du: &mut [f64; 2]| {
@@ -105,15 +105,15 @@ impl<S> Rkl2<S> {
         Ok(Self { stages, substeps: 1, start: None, work: Work::default() })
     }
 
-    /// The fewest evaluations with which a step of `dt` keeps `limit`: one substep, of the fewest stages, for symmetric
-    /// rows; as many substeps of at most 40 stages as it takes for others.
+    /// The fewest substeps, and then the fewest stages, with which a step of `dt` keeps `limit`: stages of any number for
+    /// symmetric rows, at most 40 for others. The interval counted on is (s^2 + s - 2)/2 for odd s too.
     ///
     /// The decay rate of `limit` must be a bound on |lambda|, that of the row sums where the rows are not symmetric.
     ///
     /// # Errors
     /// [`TimeError::Step`] where dt is not positive and finite; [`TimeError::Limit`] where it is above a largest step that
     /// `limit` sets to every stepper, or above what 2^32 - 1 substeps reach.
-    pub fn for_decay(limit: &StepLimit, dt: f64, symmetry: Symmetry) -> Result<Self> {
+    pub fn for_decay(limit: &StepLimit, dt: f64, symmetry: RowSymmetry) -> Result<Self> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(TimeError::Step { dt }.into());
         }
@@ -153,16 +153,16 @@ impl<S> Rkl2<S> {
     ///
     /// # Errors
     /// [`TimeError::Stages`].
-    pub fn check_rows(&self, symmetry: Symmetry) -> Result<()> {
+    pub fn check_rows(&self, symmetry: RowSymmetry) -> Result<()> {
         let (stages, low, high) = (self.stages, FEWEST, most_stages(symmetry));
         if stages <= high { Ok(()) } else { Err(TimeError::Stages { stages, low, high }.into()) }
     }
 }
 
-fn most_stages(symmetry: Symmetry) -> u32 {
+fn most_stages(symmetry: RowSymmetry) -> u32 {
     match symmetry {
-        Symmetry::Symmetric => MOST,
-        Symmetry::General => MOST_GENERAL,
+        RowSymmetry::Symmetric => MOST,
+        RowSymmetry::General => MOST_GENERAL,
     }
 }
 
@@ -207,15 +207,15 @@ impl<S: State> Stepper<S> for Rkl2<S> {
         2
     }
 
-    fn check_symmetry(&self, symmetry: Symmetry) -> Result<()> {
+    fn check_symmetry(&self, symmetry: RowSymmetry) -> Result<()> {
         self.check_rows(symmetry)
     }
 
     fn negative_real_interval(&self) -> f64 {
         let s = self.stages;
         // P_s(-1) is 1 for even s; for odd s it is -1, and the factor reaches -1 a little beyond.
-        let (mut inside, mut outside) = (-1.0, -2.0);
-        while s % 2 == 1 {
+        let (mut inside, mut outside) = (-1.0, if s.is_multiple_of(2) { -1.0 } else { -2.0 });
+        loop {
             let middle = (inside + outside) / 2.0;
             if middle == inside || middle == outside {
                 break;
@@ -276,8 +276,9 @@ impl<S: State> Work<S> {
             let nu = (1.0 - x) / x * b(j) / b(j - 2);
             let next = nu * c[0];
             older.add_scaled(mu * c[1] / next, newer);
-            older.add_scaled(mu * w * h / next, rate);
+            // Of opposite signs, and the larger one last, so that less overflows on the way.
             older.add_scaled((b(j - 1) - 1.0) * mu * w * h / next, first);
+            older.add_scaled(mu * w * h / next, rate);
             stage.set_sum(u, next, older);
             c = [c[1], next];
             std::mem::swap(&mut older, &mut newer);

@@ -18,7 +18,7 @@ const NEGATIVE_REAL: f64 = 2.512745326618329;
 ///
 /// ```
 /// use parops::{SspRk3, Stepper};
-/// let mut u = 1.0;
+/// let mut u = 1.0_f64;
 /// SspRk3::new().step(0.0, 0.5, &mut u, &mut |_, u, du| {
 ///     *du = -u;
 ///     Ok(())

@@ -1,6 +1,6 @@
 //! The seam of every time stepping scheme, and the checks all of them share.
 
-use super::rkl2::Symmetry;
+use super::rkl2::RowSymmetry;
 use super::state::State;
 use crate::error::{Error, Result, TimeError};
 
@@ -48,7 +48,7 @@ pub trait Stepper<S: State> {
     ///
     /// # Errors
     /// [`TimeError::Stages`] for more stages of [`Rkl2`](crate::Rkl2) than rows that are not symmetric bear.
-    fn check_symmetry(&self, symmetry: Symmetry) -> Result<()> {
+    fn check_symmetry(&self, symmetry: RowSymmetry) -> Result<()> {
         let _ = symmetry;
         Ok(())
     }
@@ -74,7 +74,7 @@ impl<S: State, P: Stepper<S> + ?Sized> Stepper<S> for Box<P> {
         (**self).step(t, dt, u, rhs)
     }
 
-    fn check_symmetry(&self, symmetry: Symmetry) -> Result<()> {
+    fn check_symmetry(&self, symmetry: RowSymmetry) -> Result<()> {
         (**self).check_symmetry(symmetry)
     }
 

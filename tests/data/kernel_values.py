@@ -279,6 +279,35 @@ def weights(table, u):
     return [entry(*piece(row, 0, mpf(u))) for row in reversed(table)] + [entry(*piece(row, 0, -mpf(u))) for row in table]
 
 
+# One-sided kernels.
+
+def one_sided(beta, order, side, dim, points):
+    """pi^(-D/2) (sum_j a_j z_1^j) prod_(k > 1) P(z_k^2) exp(-|z|^2) for z_1 > 0; the monomials are the terms."""
+    n = beta + order - 1
+    half = lambda k: mp.gamma(mpf(k + 1) / 2) / (2 * mp.sqrt(pi))
+    rows = [[half(j + alpha) for j in range(1, n + 1)] + [mpf((-1) ** beta * factorial(beta)) if alpha == beta else mpf(0)]
+            for alpha in range(1, n + 1)]
+    a = solve(rows)
+    # The identity kernel of one dimension, of the lowest even order not below beta + order.
+    r = (beta + order + 1) // 2
+    across = solve([[F(factorial(2 * (k + m)), factorial(k + m) * 4 ** (k + m)) for k in range(r)] + [F(int(m == 0))]
+                    for m in range(r)])
+    out = []
+    for z in points:
+        z = [mpf(x) for x in z]
+        along = z[0] if side == "left" else -z[0]
+        if along <= 0:
+            out.append(entry(mpf(0), mpf(0)))
+            continue
+        front = exp(-sum(x * x for x in z)) / pi ** (mpf(dim) / 2)
+        value, size = sum(c * along ** (j + 1) for j, c in enumerate(a)), sum(abs(c) * along ** (j + 1) for j, c in enumerate(a))
+        for x in z[1:]:
+            terms = [mpf(c.numerator) / c.denominator * x ** (2 * k) for k, c in enumerate(across)]
+            value, size = value * sum(terms), size * sum(map(abs, terms))
+        out.append(entry(front * value * ((-1) ** beta if side == "right" else 1), front * size))
+    return out
+
+
 # Points: full mantissas, so that squares do not fit a double.
 
 def points(dim, radii, seed):
@@ -295,6 +324,8 @@ RADII = [2.0 ** -28, 3e-3, 0.11, 0.27, 0.4, 0.55, 0.71, 0.83, 0.97, 1.13, 1.31, 
          4.95, 5.000001, 5.6, 6.3]
 
 
+# Exact in binary.
+TENSORS = {1: [[F(3, 2)]], 2: [[F(2), F(1, 2)], [F(1, 2), F(1)]], 3: [[F(3), F(1, 2), F(-1, 4)], [F(1, 2), F(1), F(0)], [F(-1, 4), F(0), F(2)]]}
 # Around the knots and edges of the compact kernels.
 COMPACT = [2.0 ** -28, 0.04, 0.3, 0.62, 0.97, 1.002, 1.3, 1.6, 1.9, 1.997, 2.04, 2.5, 2.9, 2.996, 3.1]
 # Inside and outside of the mesh kernels, and offsets from the middle of the nodes.
@@ -332,6 +363,14 @@ def main():
             continue
         # The monomials of P.
         family("Exchange", dim, F(1), lambda beta: (p, absolute(p)), 0, operator=operator, order=order)
+    for dim, form in TENSORS.items():
+        share = sum(form[i][i] for i in range(dim)) / F(dim + 2)
+        p = {}
+        for i, j in product(range(dim), repeat=2):
+            alpha = tuple((axis == i) + (axis == j) for axis in range(dim))
+            p[alpha] = p.get(alpha, 0) + 4 * (form[i][j] - share * (i == j))
+        # The monomials of 4 z . m z.
+        family("AnisotropicGaussian", dim, F(1), lambda beta: (p, absolute(p)), 0, tensor=[[float(a) for a in row] for row in form])
     for name, limit in LIMITS.items():
         for dim in (1, 2, 3):
             every = multi_indices(dim, range(1, (limit if dim == 1 else min(limit, 4)) + 1))
@@ -344,6 +383,10 @@ def main():
     kernels.append({"kernel": "RationalLaplacian", "dim": 3, "points": "smooth3", "values": rational(lists["smooth3"])})
     for dim in (1, 2, 3):
         kernels.append({"kernel": "LatticeHat", "dim": dim, "points": f"compact{dim}", "values": hat(lists[f"compact{dim}"])})
+    for beta, order, side, dim in [(b, r, s, 1) for b in (1, 2) for r in (1, 2, 3, 4) for s in ("left", "right")] + [
+            (1, 1, "left", 2), (2, 2, "right", 2), (1, 3, "left", 3)]:
+        kernels.append({"kernel": "OneSidedGaussian", "dim": dim, "degree": beta, "order": order, "side": side,
+                        "points": f"smooth{dim}", "values": one_sided(beta, order, side, dim, lists[f"smooth{dim}"])})
     for p, r in [(2, 1), (2, 2), (4, 2), (4, 4), (6, 4), (6, 6), (8, 4)]:
         table = interpolation(p, r)
         at = lambda degree: [interpolated(table, degree, s) for s, in lists["distances"]]
