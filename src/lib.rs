@@ -57,8 +57,8 @@ mod stencil;
 mod time;
 
 pub use apply::{
-    Advect, Apply, Field, Histogram, Hyperviscosity, MatrixFree, RawRows, Report, Row, Rows, SidedRows, Strided,
-    SymmetricPse, UpwindDcPse, UpwindRows, Vector,
+    Advect, Apply, Field, Histogram, Hyperviscosity, MatrixFree, MovingMethod, RawRows, Report, Row, Rows, SidedRows,
+    Strided, SymmetricPse, UpwindDcPse, UpwindRows, Vector,
 };
 pub use boundary::*;
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
@@ -81,7 +81,7 @@ pub use multi_index::*;
 pub use neighbors::KdTree;
 pub use neighbors::{
     BruteForce, Canonical, CellList, HalfList, Nearest, NeighborList, Neighbors, Pair, Selected, Symmetry, Upstream,
-    VerletList, epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors,
+    VerletList, epsilon_from_neighbors, fill_distance, least_gap, mean_neighbor_distance, volumes_from_neighbors,
 };
 pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};

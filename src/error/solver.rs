@@ -113,6 +113,13 @@ kinds! {
             /// Time.
             t: f64,
         } => "component {axis} of the velocity at t = {t} is {value}",
+        /// A gradient of the velocity that is not finite.
+        VelocityGradient {
+            /// Its largest singular value.
+            value: f64,
+            /// Time.
+            t: f64,
+        } => "the largest singular value of the velocity gradient at t = {t} is {value}",
         /// A divergence of the velocity that is not finite.
         Divergence {
             /// The divergence.
@@ -146,5 +153,43 @@ kinds! {
             /// The velocity along it.
             velocity: f64,
         } => "nothing lies upstream along axis {axis}, where the velocity is {velocity}: an inflow condition is needed",
+        /// A volume of a moving particle that is not positive: it was compressed to nothing within a step.
+        Volume {
+            /// The volume.
+            volume: f64,
+            /// Time.
+            t: f64,
+        } => "the volume at t = {t} is {volume}, it must stay positive",
+        /// The scheme of particles that move, where they stay.
+        Stays {
+            /// Number of particles.
+            particles: usize,
+        } => "the scheme is that of moving particles, these {particles} stay: name a scheme for v . grad u",
+        /// A constant of the Lagrangian CFL condition that is not between 0 and 1.
+        Courant {
+            /// The constant.
+            constant: f64,
+        } => "dt times the largest singular value of grad v must stay below a number between 0 and 1, not {constant}",
+        /// A remeshing kernel of less exactness than the order of the operator.
+        Exactness {
+            /// Exactness P of the kernel.
+            exactness: u32,
+            /// Order r of the operator.
+            order: u32,
+        } => "remeshing with exactness {exactness} would spoil the order {order} of the operator",
+        /// A remeshing mesh whose axis is not that of the domain.
+        MeshAxis {
+            /// Axis.
+            axis: usize,
+            /// Faces of the mesh.
+            mesh: [f64; 2],
+            /// Faces of the domain.
+            domain: [f64; 2],
+        } => "axis {axis}: the mesh from {mesh:?} is not periodic where the domain from {domain:?} is, or the other way round, or with another period",
+        /// A remeshing trigger that would never, or always, be met.
+        Trigger {
+            /// Its number.
+            value: f64,
+        } => "remeshing cannot be triggered by {value}",
     }
 }

@@ -85,12 +85,32 @@ pub trait Velocity<const D: usize>: Sync {
 
     /// The velocity at particle p, which is at x, at time t.
     fn at(&self, p: usize, x: &[f64; D], t: f64) -> [f64; D];
+
+    /// The gradient dv_j/dx_k at \[j]\[k], by default from central differences over 2 `step`; `None` where the velocity
+    /// is only known at the particles.
+    fn gradient(&self, p: usize, x: &[f64; D], t: f64, step: f64) -> Option<[[f64; D]; D]> {
+        let mut gradient = [[0.0; D]; D];
+        for k in 0..D {
+            let (mut above, mut below) = (*x, *x);
+            above[k] += step;
+            below[k] -= step;
+            let (v, w, width) = (self.at(p, &above, t), self.at(p, &below, t), above[k] - below[k]);
+            for (row, (v, w)) in gradient.iter_mut().zip(v.iter().zip(&w)) {
+                row[k] = (v - w) / width;
+            }
+        }
+        Some(gradient)
+    }
 }
 
 impl<const D: usize> Velocity<D> for [f64; D] {
     #[inline(always)]
     fn at(&self, _: usize, _: &[f64; D], _: f64) -> [f64; D] {
         *self
+    }
+
+    fn gradient(&self, _: usize, _: &[f64; D], _: f64, _: f64) -> Option<[[f64; D]; D]> {
+        Some([[0.0; D]; D])
     }
 }
 
@@ -102,6 +122,10 @@ impl<const D: usize> Velocity<D> for Vec<[f64; D]> {
     #[inline(always)]
     fn at(&self, p: usize, _: &[f64; D], _: f64) -> [f64; D] {
         self.get(p).copied().unwrap_or([f64::NAN; D])
+    }
+
+    fn gradient(&self, _: usize, _: &[f64; D], _: f64, _: f64) -> Option<[[f64; D]; D]> {
+        None
     }
 }
 

@@ -3,6 +3,9 @@
 use num_traits::AsPrimitive;
 
 use crate::apply::Field;
+use crate::error::Result;
+use crate::kernel::MeshKernel;
+use crate::mesh::{Mesh, Remeshed};
 use crate::scalar::Scalar;
 use crate::time::Entry;
 
@@ -40,6 +43,24 @@ pub trait Fields: Entry {
 
     /// Sets field i, rounded to its number type; does nothing beyond the last.
     fn set(&mut self, i: usize, value: f64);
+
+    /// Adds strengths to a mesh, as [`Mesh::deposit`].
+    ///
+    /// # Errors
+    /// As [`Mesh::deposit`].
+    fn deposit<const D: usize, const S: usize>(
+        mesh: &Mesh<D>,
+        kernel: &impl MeshKernel<f64, S>,
+        points: &[[f64; D]],
+        strengths: &[Self],
+        out: &mut [Self],
+    ) -> Result<()>;
+
+    /// Makes particles of the values on a mesh, as [`Mesh::remesh`], with one threshold for all fields.
+    ///
+    /// # Errors
+    /// As [`Mesh::remesh`].
+    fn remesh<const D: usize>(mesh: &Mesh<D>, values: &[Self], threshold: f64) -> Result<Remeshed<Self, D>>;
 }
 
 macro_rules! one_field {
@@ -68,6 +89,20 @@ macro_rules! one_field {
             #[inline(always)]
             fn set(&mut self, _: usize, value: f64) {
                 *self = <$t as Scalar>::lift(value);
+            }
+
+            fn deposit<const D: usize, const S: usize>(
+                mesh: &Mesh<D>,
+                kernel: &impl MeshKernel<f64, S>,
+                points: &[[f64; D]],
+                strengths: &[Self],
+                out: &mut [Self],
+            ) -> Result<()> {
+                mesh.deposit(kernel, points, strengths, out)
+            }
+
+            fn remesh<const D: usize>(mesh: &Mesh<D>, values: &[Self], threshold: f64) -> Result<Remeshed<Self, D>> {
+                mesh.remesh(values, <$t as Scalar>::lift(threshold))
             }
         }
 
@@ -99,6 +134,20 @@ macro_rules! one_field {
                 if let Some(own) = self.as_mut_slice().get_mut(i) {
                     *own = <$t as Scalar>::lift(value);
                 }
+            }
+
+            fn deposit<const D: usize, const S: usize>(
+                mesh: &Mesh<D>,
+                kernel: &impl MeshKernel<f64, S>,
+                points: &[[f64; D]],
+                strengths: &[Self],
+                out: &mut [Self],
+            ) -> Result<()> {
+                mesh.deposit_fields(kernel, points, strengths, out)
+            }
+
+            fn remesh<const D: usize>(mesh: &Mesh<D>, values: &[Self], threshold: f64) -> Result<Remeshed<Self, D>> {
+                mesh.remesh_fields(values, [<$t as Scalar>::lift(threshold); F])
             }
         }
     )* };

@@ -26,8 +26,10 @@ pub struct Totals<const D: usize> {
     pub negative_mass: f64,
     /// Mass now less mass at the start of the run.
     pub drift: f64,
-    /// Strength lost beyond the mesh, in all remeshings so far.
+    /// Strength below the threshold that became no particle, in all remeshings so far.
     pub dropped: f64,
+    /// The same with absolute values.
+    pub dropped_size: f64,
 }
 
 /// Particles summed one by one before block sums are: the error of a sum is of the order of this plus N over it, in eps of
@@ -73,7 +75,14 @@ impl<const D: usize> Totals<D> {
         negative_mass: 0.0,
         drift: 0.0,
         dropped: 0.0,
+        dropped_size: 0.0,
     };
+
+    /// Takes other totals, but what has been dropped, and the drift from the mass at the start.
+    pub(super) fn renew(&mut self, now: Self, start: Option<f64>) {
+        let drift = now.mass - start.unwrap_or(now.mass);
+        *self = Self { drift, dropped: self.dropped, dropped_size: self.dropped_size, ..now };
+    }
 
     fn merge(&mut self, part: &Self) {
         self.mass += part.mass;
@@ -120,6 +129,8 @@ pub struct LedgerRow<const D: usize> {
     pub residual: f64,
     /// Remeshings so far.
     pub remeshings: u64,
+    /// How often the neighbors of moving particles were searched anew so far, remeshings included.
+    pub rebuilds: u64,
     /// The totals, field by field.
     pub fields: Vec<Totals<D>>,
 }
@@ -140,6 +151,7 @@ impl<const D: usize> LedgerRow<D> {
             condition: 0.0,
             residual: 0.0,
             remeshings: 0,
+            rebuilds: 0,
             fields: vec![Totals::NOTHING; fields],
         }
     }
@@ -150,8 +162,7 @@ impl<const D: usize> LedgerRow<D> {
         let volume = |p: usize| volumes.and_then(|volumes| volumes.get(p).ok()).unwrap_or(1.0);
         for (i, totals) in self.fields.iter_mut().enumerate() {
             let of = |p: usize| u.get(p).map_or((0.0, 0.0), |u| (volume(p) * u.get(i), u.get(i)));
-            *totals = Totals { dropped: totals.dropped, ..Totals::measure(particles.points(), of) };
-            totals.drift = totals.mass - start.get(i).copied().unwrap_or(totals.mass);
+            totals.renew(Totals::measure(particles.points(), of), start.get(i).copied());
         }
     }
 }
@@ -191,9 +202,10 @@ impl<const D: usize> Ledger<D> {
     }
 
     fn write_to(&self, out: &mut impl Write) -> io::Result<()> {
-        write!(out, "step,t,dt,limit,binding,within_limit,substeps,retries,growth,condition,residual,remeshings")?;
+        write!(out, "step,t,dt,limit,binding,within_limit,substeps,retries,growth,condition,residual")?;
+        write!(out, ",remeshings,rebuilds")?;
         for i in 0..self.rows.first().map_or(0, |row| row.fields.len()) {
-            for name in ["mass", "size", "min", "max", "negative_mass", "drift", "dropped"] {
+            for name in ["mass", "size", "min", "max", "negative_mass", "drift", "dropped", "dropped_size"] {
                 write!(out, ",{name}_{i}")?;
             }
             axes::<D>().try_for_each(|(a, b)| match b {
@@ -216,10 +228,11 @@ impl<const D: usize> LedgerRow<D> {
         let binding = self.binding.map_or("", Limit::name);
         write!(out, "{},{:e},{:e},{:e},{binding},{}", self.step, self.t, self.dt, self.limit, self.within_limit)?;
         write!(out, ",{},{},{:e}", self.substeps, self.retries, self.growth)?;
-        write!(out, ",{:e},{:e},{}", self.condition, self.residual, self.remeshings)?;
+        write!(out, ",{:e},{:e}", self.condition, self.residual)?;
+        write!(out, ",{},{}", self.remeshings, self.rebuilds)?;
         for field in &self.fields {
-            let Totals { mass, size, min, max, negative_mass, drift, dropped, .. } = field;
-            write!(out, ",{mass:e},{size:e},{min:e},{max:e},{negative_mass:e},{drift:e},{dropped:e}")?;
+            let Totals { mass, size, min, max, negative_mass, drift, dropped, dropped_size, .. } = field;
+            write!(out, ",{mass:e},{size:e},{min:e},{max:e},{negative_mass:e},{drift:e},{dropped:e},{dropped_size:e}")?;
             axes::<D>()
                 .try_for_each(|(a, b)| write!(out, ",{:e}", b.map_or(field.first[a], |b| field.second[a][b])))?;
         }

@@ -7,9 +7,10 @@
 //! The scene, its coefficients, [`Limits`], [`Ledger`] and the policies know nothing of how the particles move: every
 //! solver is made of them. [`SceneTerm`] is the seam of a term, [`Transport`] that of an advection scheme,
 //! [`FlowDivergence`] that of div v, [`Edge`] that of the boundary. [`SemiDiscrete`] and [`Eulerian`] are for particles
-//! that stay.
+//! that stay, [`Lagrangian`] for particles that the flow carries: there [`Flow`] and [`MovingDiffusion`] are the seams.
 
 mod advection;
+mod carried;
 mod central;
 mod coefficient;
 mod diffusion;
@@ -17,11 +18,16 @@ mod divergence;
 mod edge;
 mod eulerian;
 mod fields;
+mod flow;
 mod free;
 mod growth;
+mod lagrangian;
 mod ledger;
 mod limits;
+mod moving;
+mod moving_diffusion;
 mod policy;
+mod remeshing;
 mod saved;
 mod scene;
 mod scheme;
@@ -35,6 +41,7 @@ mod upwind;
 mod upwind_dcpse;
 
 pub use advection::{Advection, AdvectionRows};
+pub use carried::{Carried, CarriedRows};
 pub use central::{Central, CentralRows};
 pub use coefficient::{Diffusivity, Steady, Velocity};
 pub use diffusion::{Diffusion, DiffusionRows};
@@ -42,10 +49,15 @@ pub use divergence::{ComputedDivergence, DivergenceValues, FlowDivergence, Given
 pub use edge::{Boundary, Bounded, BoundedState, Edge};
 pub use eulerian::Eulerian;
 pub use fields::Fields;
+pub use flow::Flow;
+pub use lagrangian::{COURANT, Lagrangian};
 pub use ledger::{Ledger, LedgerRow, Totals};
 pub use limits::{Limits, Rate};
+pub use moving::{MovingScene, MovingState};
+pub use moving_diffusion::{MovingDiffusion, MovingRows, MovingSettings};
 pub use policy::{GrowthPolicy, StepPolicy};
-pub use saved::SavedRun;
+pub use remeshing::{Remeshing, Trigger};
+pub use saved::{SavedParticles, SavedRun};
 pub use scene::{AdvectionDiffusion, NoTerms, Scene};
 pub use scheme::{ImplicitScheme, Stages, TimeScheme};
 pub use semi_discrete::SemiDiscrete;

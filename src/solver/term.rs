@@ -36,6 +36,16 @@ impl<const D: usize> Site<D> {
         Ok(Self { particles: particles.clone(), prescribed: Vec::new(), inflow: Vec::new() })
     }
 
+    /// These particles, which will move.
+    pub(super) fn moving(particles: Particles<D>) -> Self {
+        Self { particles, prescribed: Vec::new(), inflow: Vec::new() }
+    }
+
+    /// The particles, to be moved.
+    pub(super) fn particles_mut(&mut self) -> &mut Particles<D> {
+        &mut self.particles
+    }
+
     /// The particles.
     pub fn particles(&self) -> &Particles<D> {
         &self.particles
@@ -90,6 +100,9 @@ pub trait SceneTerm<const D: usize, E: Fields>: Sync {
 
     /// Sweeps over stored rows a stage.
     const APPLIES: usize;
+
+    /// Whether there is such a term.
+    const PRESENT: bool = true;
 
     /// Makes the rows.
     ///
@@ -150,6 +163,7 @@ pub trait SceneTerm<const D: usize, E: Fields>: Sync {
 impl<const D: usize, E: Fields> SceneTerm<D, E> for () {
     type Rows = ();
     const APPLIES: usize = 0;
+    const PRESENT: bool = false;
 
     fn build<P: Neighbors<D>>(&self, _: &Site<D>, _: &P) -> Result<()> {
         Ok(())
