@@ -422,3 +422,25 @@ fn lagrangian_cfl_binds_remeshed_runs_too() -> Result<()> {
     run.step(0.99)?;
     Ok(())
 }
+
+#[test]
+fn set_whose_strength_is_all_dropped_goes_on_empty() -> Result<()> {
+    let torus = Domain::periodic([0.0; 2], [1.0; 2])?;
+    let particles = Particles::lattice([0.0; 2], [1.0; 2], [16; 2])?;
+    let scene =
+        AdvectionDiffusion::<2>::new().diffusion(1e-3, DcPse::<Laplacian<2>, 2>::new()).advection([1.0, 0.0], Carried);
+    let remeshing = Remeshing {
+        kernel: Lambda::<2, 1>::new()?,
+        mesh: Mesh::cells(&torus, [16; 2])?,
+        trigger: Trigger::Steps(1),
+        threshold: 1.0,
+    };
+    let mut run = Lagrangian::new(scene, &particles, &[1.0; 256], &torus, Rk4::new())?.remeshing(remeshing)?;
+    run.step(0.01)?;
+    assert!(run.points().is_empty());
+    run.step(0.01)?;
+    let field = &run.ledger().fields[0];
+    assert_eq!((field.mass, run.ledger().remeshings), (0.0, 2));
+    assert!((field.dropped - 1.0).abs() <= 8.0 * EPS && field.drift == -1.0);
+    Ok(())
+}
