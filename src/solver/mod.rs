@@ -22,6 +22,7 @@ mod flow;
 mod free;
 mod growth;
 mod lagrangian;
+mod lagrangian_record;
 mod ledger;
 mod limits;
 mod moving;
