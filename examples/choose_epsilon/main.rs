@@ -73,7 +73,7 @@ impl Plan {
         Self {
             pse_side,
             dcpse_side,
-            pse_orders: if quick { &[2, 6] } else { &[2, 4, 6, 8] },
+            pse_orders: if quick { &[4, 8] } else { &[2, 4, 6, 8] },
             dcpse_orders: if quick { &[2, 4] } else { &[2, 3, 4, 5, 6] },
             overlaps: if quick { &[1.0, 1.3] } else { &OVERLAPS[..4] },
             overlap,

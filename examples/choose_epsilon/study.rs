@@ -64,7 +64,7 @@ struct Built {
 }
 
 /// Builds that take less are repeated for this long together.
-const BUILD_SECONDS: f64 = 0.02;
+const BUILD_SECONDS: f64 = 0.005;
 /// Applications are repeated for this long, the fastest counts.
 const APPLY_SECONDS: f64 = 0.003;
 
