@@ -28,7 +28,8 @@
 //! ```
 //!
 //! # Features
-//! `faer`: sparse LU for coupled boundary conditions and steady problems; matrices as those of that package.
+//! `faer`: sparse LU for coupled boundary conditions, steady problems and implicit steps; matrices as those of that
+//! package.
 //! `kiddo`: a neighbor provider over an immutable k-d tree.
 //! `rayon`: rows are built and applied by several threads, with the same bits for any number of them.
 //! `serde`: rows and reports saved and read back bit for bit.
@@ -51,12 +52,13 @@ mod operator;
 mod particles;
 mod scalar;
 mod scale;
+mod solver;
 mod stencil;
 mod time;
 
 pub use apply::{
-    Advect, Apply, Field, Histogram, Hyperviscosity, MatrixFree, RawRows, Report, Row, Rows, SidedRows, Strided,
-    SymmetricPse, UpwindDcPse, UpwindRows, Vector,
+    Advect, Apply, Field, Histogram, Hyperviscosity, MatrixFree, MovingMethod, RawRows, Report, Row, Rows, SidedRows,
+    Strided, SymmetricPse, UpwindDcPse, UpwindRows, Vector,
 };
 pub use boundary::*;
 pub use domain::{Domain, Face, LENGTH_HIGH, LENGTH_LOW};
@@ -79,12 +81,13 @@ pub use multi_index::*;
 pub use neighbors::KdTree;
 pub use neighbors::{
     BruteForce, Canonical, CellList, HalfList, Nearest, NeighborList, Neighbors, Pair, Selected, Symmetry, Upstream,
-    VerletList, epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors,
+    VerletList, epsilon_from_neighbors, fill_distance, least_gap, mean_neighbor_distance, volumes_from_neighbors,
 };
 pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};
 pub use scalar::Scalar;
 pub use scale::{Cutoff, Epsilon, Spacing, Volumes};
+pub use solver::*;
 pub use stencil::{Neighbor, Side, Stencil};
 pub use time::*;
 

@@ -106,15 +106,15 @@ impl<const D: usize> Stencil<D> {
         self.signs.clear();
     }
 
+    /// Names another target for the neighbors it holds.
+    pub(crate) fn rename(&mut self, target: usize) {
+        self.target = target;
+    }
+
     /// Says that the neighbors were asked around another place m than the target, `middle` = x_p - m; call it after
     /// [`reset`](Self::reset), which sets it to zero.
     pub fn set_middle(&mut self, middle: [f64; D]) {
         self.middle = middle;
-    }
-
-    /// Names another target for the neighbors it holds.
-    pub(crate) fn rename(&mut self, target: usize) {
-        self.target = target;
     }
 
     /// Adds a neighbor. Providers hold fewer than 2^32 sources, so that an index fits 32 bits.

@@ -277,6 +277,7 @@ fn values_weights_and_derivatives_equal_the_exact_polynomials() {
         for s in [support, 1.5 * support, 1e300] {
             assert_eq!((kernel.value(s), kernel.derivative(1, -s).unwrap()), (0.0, 0.0));
         }
+        assert!(kernel.value(f64::NAN).is_nan() && kernel.derivative(1, f64::NAN).unwrap().is_nan());
         let beyond = kernel.derivative(R as u32 + 1, 0.3).unwrap_err();
         let degree = R as u32 + 1;
         assert_eq!(beyond, Error::from(KernelError::Regularity { kernel: "Lambda", degree, limit: R as u32 }));

@@ -1,11 +1,11 @@
-//! Sparse matrices, their incomplete factors and GMRES, against dense algebra.
+//! Sparse matrices, their incomplete factors, GMRES and BiCGSTAB, against dense algebra.
 
 use std::env;
 
 use nalgebra::{DMatrix, DVector};
 use parops::{
-    Apply, ApplyError, CellList, CsrMatrix, DcPse, Domain, Error, ErrorKind, Gmres, Ilu0, Laplacian, LinearError,
-    Particles, Random, Result, SparseSolver,
+    Apply, ApplyError, BiCgStab, CellList, CsrMatrix, DcPse, Domain, Error, ErrorKind, Gmres, Ilu0, Laplacian,
+    LinearError, Particles, Random, Result, SparseSolver,
 };
 use proptest::prelude::*;
 
@@ -112,6 +112,33 @@ proptest! {
         // The residual is computed here in another order: n eps |A| |x| / |b| apart at most.
         let scale = dense(&a).norm() * DVector::from_row_slice(&x).norm() / DVector::from_row_slice(&b).norm();
         prop_assert!((residual(&a, &b, &x) - report.residual).abs() <= n as f64 * EPS * (1.0 + scale));
+    }
+
+    #[test]
+    fn bicgstab_reaches_its_tolerance_on_random_dominant_matrices(seed in any::<u64>(), n in 1_usize..60) {
+        let a = random_matrix(n, 4, 1.2, seed).unwrap();
+        let b = noise(n, seed ^ 1);
+        let mut x = vec![f64::NAN; n];
+        let report = BiCgStab::new().solve(&a, Some(&Ilu0::new(&a).unwrap()), &b, &mut x).unwrap();
+        prop_assert!(report.residual <= 1e-13);
+        let scale = dense(&a).norm() * DVector::from_row_slice(&x).norm() / DVector::from_row_slice(&b).norm();
+        prop_assert!((residual(&a, &b, &x) - report.residual).abs() <= n as f64 * EPS * (1.0 + scale));
+    }
+
+    #[test]
+    fn better_guesses_take_fewer_iterations_to_the_same_residual(seed in any::<u64>(), n in 20_usize..60) {
+        let a = random_matrix(n, 4, 1.2, seed).unwrap();
+        let b = noise(n, seed ^ 1);
+        for mut solver in solvers(&a).unwrap() {
+            let mut x = vec![0.0; n];
+            let whole = solver.solve(&b, &mut x).unwrap();
+            let mut near: Vec<f64> = x.iter().zip(noise(n, seed ^ 2)).map(|(x, noise)| x * (1.0 + 1e-8 * noise)).collect();
+            let rest = solver.improve(&b, &mut near).unwrap();
+            prop_assert!(rest.iterations <= whole.iterations && rest.residual <= 1e-13);
+            // Both are within the residual of the solution, the matrix being dominant.
+            let size = x.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
+            prop_assert!(x.iter().zip(&near).all(|(x, y)| (x - y).abs() < 1e-10 * size));
+        }
     }
 
     #[test]
@@ -232,6 +259,71 @@ fn gmres_says_how_far_it_came_where_it_does_not_converge() -> Result<()> {
 }
 
 #[test]
+fn bicgstab_gives_equal_bits_again_and_under_scaling_by_powers_of_two() -> Result<()> {
+    let a = convection(15, 0.2)?;
+    let factors = Ilu0::new(&a)?;
+    let b = noise(225, 9);
+    let mut bicgstab = BiCgStab::new();
+    let (mut first, mut again) = (vec![0.0; 225], vec![7.0; 225]);
+    bicgstab.solve(&a, Some(&factors), &b, &mut first)?;
+    bicgstab.solve(&a, None, &noise(225, 10), &mut again)?;
+    for power in [-700, 0, 5, 700] {
+        let factor = 2.0_f64.powi(power);
+        let scaled: Vec<f64> = b.iter().map(|b| b * factor).collect();
+        bicgstab.solve(&a, Some(&factors), &scaled, &mut again)?;
+        assert!(first.iter().zip(&again).all(|(x, y)| x * factor == *y), "2^{power}");
+    }
+    let report = bicgstab.solve(&a, None, &[0.0; 225], &mut again)?;
+    assert!(again == [0.0; 225] && report.iterations == 0);
+    Ok(())
+}
+
+#[test]
+fn bicgstab_solves_matrices_of_any_scale() -> Result<()> {
+    let entries = [(0, 0, 2.0), (0, 1, 1.0), (1, 0, 1.0), (1, 1, 3.0), (2, 2, 1.0), (2, 0, 0.5)];
+    for scale in [1e-300, 1e-160, 1e160, 1e300] {
+        let a = CsrMatrix::from_triplets(3, 3, entries.map(|(p, q, value)| (p, q, scale * value)))?;
+        let mut x = [0.0; 3];
+        BiCgStab::new().solve(&a, None, &[3.0, 4.0, 1.5], &mut x)?;
+        assert!(x.iter().all(|x| (x * scale - 1.0).abs() < 1e-12), "{scale:e}: {x:?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn bicgstab_says_how_far_it_came_where_it_does_not_converge_or_breaks_down() -> Result<()> {
+    let a = convection(20, 0.3)?;
+    let b = noise(400, 1);
+    let mut x = vec![0.0; 400];
+    for most in [1, 12, 13] {
+        let error = BiCgStab::new().most(most).solve(&a, None, &b, &mut x).unwrap_err();
+        let LinearError::NotConverged { iterations, residual: left, tolerance: 1e-13 } = linear(error.clone()) else {
+            panic!("{error}");
+        };
+        assert!(iterations == most && (left / residual(&a, &b, &x) - 1.0).abs() < 1e-9, "{left}");
+        assert!(left <= 1.0);
+    }
+    // A rotation: every residual is orthogonal to its image, so that no second half of an iteration gains anything.
+    let rotation = CsrMatrix::from_triplets(2, 2, [(0, 1, 1.0), (1, 0, -1.0)])?;
+    let error = BiCgStab::new().solve(&rotation, None, &[1.0, 2.0], &mut x[..2]).unwrap_err();
+    assert!(
+        matches!(linear(error), LinearError::NotConverged { iterations, residual, .. } if iterations < 50 && residual <= 1.0)
+    );
+    // A singular matrix and a right-hand side outside its range.
+    let flat = CsrMatrix::from_triplets(2, 2, [(0, 0, 1.0), (0, 1, 1.0)])?;
+    let error = BiCgStab::new().solve(&flat, None, &[1.0, 1.0], &mut [0.0; 2]).unwrap_err();
+    assert!(matches!(linear(error), LinearError::NotConverged { residual, .. } if residual > 0.7));
+    assert_eq!(
+        linear(BiCgStab::new().tolerance(1.0).unwrap_err()),
+        LinearError::Setting { value: 1.0, low: 0.0, high: 1.0 }
+    );
+    let wide = CsrMatrix::<f64>::from_triplets(2, 3, [])?;
+    let error = BiCgStab::new().solve(&wide, None, &[1.0; 2], &mut [0.0; 2]).unwrap_err();
+    assert_eq!(linear(error), LinearError::NotSquare { rows: 2, columns: 3 });
+    Ok(())
+}
+
+#[test]
 fn matrices_refuse_entries_that_do_not_fit() {
     let refused = |entry| CsrMatrix::from_triplets(2, 3, [(0, 0, 1.0), entry]).unwrap_err();
     let outside = |row, column| LinearError::Index { row, column, rows: 2, columns: 3 };
@@ -338,9 +430,10 @@ fn condition(a: &CsrMatrix) -> f64 {
     one_norm(&full) * one_norm(&full.clone().try_inverse().unwrap())
 }
 
-/// Both methods where the feature is on.
+/// Every method; LU where the feature is on.
 fn solvers(a: &CsrMatrix) -> Result<Vec<SparseSolver>> {
     let mut solvers = vec![SparseSolver::gmres(a.clone(), Gmres::new())?];
+    solvers.push(SparseSolver::bicgstab(a.clone(), BiCgStab::new())?);
     #[cfg(feature = "faer")]
     solvers.push(SparseSolver::lu(a.clone())?);
     solvers.push(SparseSolver::new(a.clone())?);

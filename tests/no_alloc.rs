@@ -6,10 +6,13 @@ use std::cell::Cell;
 
 use parops::{
     Allowance, CellList, D2, DivTensorGrad, Domain, Epsilon, Euler, Gradient, Hessian, Laplacian, Leapfrog, Method,
-    Neighbors, OneSided, Particles, Pse, Rk4, Side, Sph, Stencil, Stepper, Upwind,
+    Neighbors, OneSided, Particles, Pse, Rk4, Rkl2, Side, Sph, SspRk3, Stencil, Stepper, Upwind,
 };
 #[cfg(not(feature = "rayon"))]
-use parops::{Apply, BoundaryCondition, BoundaryRows, NeighborList, Rows, Strided};
+use parops::{
+    Apply, BiCgStab, BoundaryCondition, BoundaryRows, CsrMatrix, Gmres, Implicit, NeighborList, Rows, SparseSolver,
+    Strided,
+};
 
 struct Counting;
 
@@ -57,8 +60,13 @@ fn the_counter_counts() {
 
 #[test]
 fn steps_after_the_first_allocate_nothing() {
-    let steppers: [Box<dyn Stepper<Vec<[f64; 2]>>>; 3] =
-        [Box::new(Euler::new()), Box::new(Rk4::new()), Box::new(Leapfrog::new())];
+    let steppers: [Box<dyn Stepper<Vec<[f64; 2]>>>; 5] = [
+        Box::new(Euler::new()),
+        Box::new(Rk4::new()),
+        Box::new(Leapfrog::new()),
+        Box::new(SspRk3::new()),
+        Box::new(Rkl2::new(5).unwrap().with_substeps(3)),
+    ];
     for mut stepper in steppers {
         let mut u = vec![[1.0, 0.0]; 1000];
         let mut steps = |stepper: &mut dyn Stepper<_>, start: f64, dt: f64, n: u32| {
@@ -258,6 +266,66 @@ fn imposing_boundary_conditions_allocates_nothing_after_the_first_time() {
     impose(0.0);
     assert_eq!(allocations(|| (0..5).for_each(|n| impose(f64::from(n)))), 0);
     assert_eq!(allocations(|| boundary.replace_values(|_| 0.0, &mut u).unwrap()), 0);
+}
+
+#[cfg(not(feature = "rayon"))]
+#[test]
+fn eulerian_steps_after_the_first_allocate_nothing() -> parops::Result<()> {
+    use parops::{AdvectionDiffusion, Boundary, DcPse, Eulerian, GrowthPolicy, Nearest, StepPolicy};
+    let set = Particles::jittered([0.0; 2], [1.0; 2], [12; 2], 0.2, 3)?.with_equal_volumes(1.0)?;
+    let neighbors = Nearest::build(&set, &Domain::open(), 20)?;
+    let near = |x: &[f64; 2]| x.iter().any(|x| *x < 0.08 || *x > 0.92);
+    let walls: Vec<_> = (0..set.len()).filter(|&p| near(&set.points()[p])).collect();
+    let scene = || {
+        AdvectionDiffusion::<2>::new()
+            .fields::<[f64; 2]>()
+            .diffusion(|x: &[f64; 2]| 0.1 + x[0], DcPse::<Laplacian<2>, 2>::new())
+            .advection(|x: &[f64; 2], t: f64| [x[1], t], DcPse::<Gradient<2>, 2>::new())
+            .computed_divergence()
+            .source(|_, t, u: [f64; 2]| [u[1] - t, -u[0]])
+    };
+    let growth = GrowthPolicy::Allow;
+    let mut free = Eulerian::with_policy(scene(), &set, &neighbors, Rk4::new(), StepPolicy::Refuse, growth)?;
+    let bounded = scene()
+        .boundary(Boundary::new(2).conditions(walls.into_iter().map(BoundaryCondition::dirichlet)), |_, x, t| {
+            [x[0], t]
+        });
+    let adapt = StepPolicy::Adapt { most: 1000 };
+    let mut cut = Eulerian::with_policy(bounded, &set, &neighbors, SspRk3::new(), adapt, growth)?;
+    let mut u = vec![[1.0, -1.0]; set.len()];
+    free.step(&mut u, 1e-4)?;
+    assert_eq!(allocations(|| (0..5).for_each(|_| assert!(free.step(&mut u, 1e-4).is_ok()))), 0);
+    cut.step(&mut u, 0.01)?;
+    assert_eq!(allocations(|| (0..3).for_each(|_| assert!(cut.step(&mut u, 0.01).is_ok()))), 0);
+    assert!(cut.ledger().substeps > 1);
+    Ok(())
+}
+
+#[cfg(not(feature = "rayon"))]
+#[test]
+fn implicit_steps_after_the_first_allocate_nothing() {
+    let (particles, domain) = particles();
+    let pse = laplacian(&particles);
+    let rows = pse.assemble(&CellList::build(&particles, &domain, pse.cutoff()).unwrap()).unwrap();
+    let solvers: &[fn(CsrMatrix) -> parops::Result<SparseSolver>] = &[
+        |matrix| SparseSolver::bicgstab(matrix, BiCgStab::new()),
+        |matrix| SparseSolver::gmres(matrix, Gmres::new()),
+        #[cfg(feature = "faer")]
+        SparseSolver::lu,
+    ];
+    for &solver in solvers {
+        let mut stepper = Implicit::crank_nicolson(rows.to_csr(0).unwrap()).unwrap().solver(solver);
+        let mut u: Vec<[f32; 2]> = particles.points().iter().map(|x| [x[0] as f32, 1.0]).collect();
+        let mut step = |n: u32| {
+            let source = &mut |t: f64, g: &mut [[f32; 2]]| {
+                g.fill([t as f32, 0.0]);
+                Ok(())
+            };
+            stepper.step(0.1 * f64::from(n), 0.1, &mut u, source).unwrap();
+        };
+        assert!(allocations(|| step(0)) > 0);
+        assert_eq!(allocations(|| (1..6).for_each(&mut step)), 0);
+    }
 }
 
 #[test]

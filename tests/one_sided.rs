@@ -105,6 +105,17 @@ fn kernels_of_any_degree_and_order_up_to_eight_have_their_half_line_moments() ->
 }
 
 #[test]
+fn a_coordinate_along_the_axis_that_is_no_number_gives_none() -> Failure {
+    for (side, axis) in [(Side::Left, 0), (Side::Right, 1)] {
+        let kernel = OneSidedGaussian::<2>::new(along(axis, 1), side, 2)?;
+        let mut z = [0.25; 2];
+        z[axis] = f64::NAN;
+        assert!(kernel.value(&z).is_nan() && kernel.value(&z.map(|x| x as f32)).is_nan());
+    }
+    Ok(())
+}
+
+#[test]
 fn kernels_pass_the_checker_in_one_and_two_dimensions() -> Failure {
     for side in SIDES {
         for beta in [1, 2] {
@@ -457,6 +468,24 @@ fn rows_for_any_velocity_give_the_bits_of_rows_for_one_and_serve_the_next_withou
         let mut stored = vec![0.0_f32; 256];
         Rows::<_, f32>::assemble(&upwind, &neighbors)?.apply(&u, &mut stored)?;
         assert!(stored.iter().zip(&one).all(|(found, one)| (f64::from(*found) - one).abs() < tolerance));
+    }
+    Ok(())
+}
+
+#[test]
+fn the_smallest_velocities_have_a_side_though_their_products_with_weights_vanish() -> Failure {
+    // Weights of 0.1 and less.
+    let set = Particles::lattice([0.0], [400.0], [40])?;
+    let ring = Domain::periodic([0.0], [400.0])?;
+    let gradient = UpwindGradient::new(set.spacing()?.epsilon(1.0)?, set.volumes()?);
+    let neighbors = CellList::build(&set, &ring, gradient.cutoff())?;
+    let (any, short) = (gradient.assemble(&neighbors)?, UpwindRows::<1, f32>::assemble(&gradient, &neighbors)?);
+    let (f, mut out) = (vec![1.0; 40], vec![1.0; 40]);
+    let (f32s, mut short_out) = (vec![1.0; 40], vec![1.0; 40]);
+    for (v, single) in [(5e-324, 1e-45), (-5e-324, -1e-45), (1e-310, 1e-39)] {
+        any.apply(&[[v]; 40], &f, &mut out)?;
+        short.apply(&[[single]; 40], &f32s, &mut short_out)?;
+        assert!(out.iter().all(|&out| out == 0.0) && short_out.iter().all(|&out| out == 0.0));
     }
     Ok(())
 }

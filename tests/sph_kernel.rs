@@ -194,20 +194,11 @@ fn sums_over_lattices_are_one_as_closely_as_stated_up_to_the_overlap_limit() {
         for i in 0..=150 {
             let h = 0.25 + (limit - 0.25) * f64::from(i) / 150.0;
             let steps = (edge / h) as i32;
-            let mut node = [-steps; D];
+            let side = 2 * steps + 1;
             let mut sum = 0.0;
-            'nodes: loop {
-                sum += value(kernel, &node.map(|k| h * f64::from(k)));
-                for axis in 0..=D {
-                    if axis == D {
-                        break 'nodes;
-                    }
-                    node[axis] += 1;
-                    if node[axis] <= steps {
-                        break;
-                    }
-                    node[axis] = -steps;
-                }
+            for node in 0..side.pow(D as u32) {
+                let index: [i32; D] = std::array::from_fn(|axis| node / side.pow(axis as u32) % side - steps);
+                sum += value(kernel, &index.map(|k| h * f64::from(k)));
             }
             let defect = (sum * h.powi(D as i32) - 1.0).abs();
             worst = worst.max(defect);

@@ -1,7 +1,7 @@
 //! The stepper checker: it passes the steppers that keep their promises and catches every one that breaks one.
 
 use parops::testing::{StepperFault, check_stepper};
-use parops::{Error, Euler, Leapfrog, Result, Rhs, Rk4, Stepper, TimeError};
+use parops::{Error, Euler, Leapfrog, Result, Rhs, Rk4, Rkl2, SspRk3, Stepper, TimeError};
 
 #[test]
 fn steppers_of_the_crate_keep_their_promises() {
@@ -11,6 +11,13 @@ fn steppers_of_the_crate_keep_their_promises() {
         (check_stepper(Euler::new), 1, 1.0),
         (check_stepper(Rk4::new), 4, 4.0),
         (check_stepper(Leapfrog::new), 1, 2.0),
+        (check_stepper(SspRk3::new), 3, 3.0),
+        (check_stepper(|| Rkl2::new(2).unwrap()), 2, 2.0),
+        (check_stepper(|| Rkl2::new(3).unwrap()), 3, 2.0),
+        (check_stepper(|| Rkl2::new(10).unwrap()), 10, 2.0),
+        (check_stepper(|| Rkl2::new(15).unwrap()), 15, 2.0),
+        (check_stepper(|| Rkl2::new(3).unwrap().with_substeps(2)), 6, 2.0),
+        (check_stepper(|| Rkl2::new(4).unwrap().with_substeps(3)), 12, 2.0),
     ];
     for (report, stages, order) in reports {
         let report = report.unwrap_or_else(|fault| panic!("{fault}"));

@@ -215,6 +215,32 @@ fn who_crosses_a_periodic_face_has_not_moved_far() {
 }
 
 #[test]
+fn boxes_as_narrow_as_can_be_serve_whoever_crosses_their_faces() {
+    let (cutoff, skin) = (0.3, 0.2);
+    let width = 2.0 * (cutoff + skin) * (1.0 + 1e-9);
+    for faces in [[[Face::Periodic; 2]; 2], [[Face::Periodic; 2], [Face::MirrorOdd, Face::MirrorEven]]] {
+        let domain = Domain::new([-0.25; 2], [width - 0.25; 2], faces).unwrap();
+        let mut random = Random::new(4);
+        // Ties at the cutoff too: some stand on a grid of an eighth of the width.
+        let place = |x: f64, i: u32| width * if i.is_multiple_of(3) { (8.0 * x).floor() / 8.0 } else { x } - 0.25;
+        let points = (0..60).map(|i| [0; 2].map(|_| place(random.uniform(), i))).collect();
+        let mut particles = Particles::new(points).unwrap();
+        let mut list = VerletList::build(&particles, &domain, Cutoff(cutoff), skin).unwrap();
+        for _ in 0..60 {
+            let step = |&[x, y]: &[f64; 2]| {
+                let [dx, dy] = [0; 2].map(|_| 0.05 * (random.uniform() - 0.5));
+                let turns = (7.0 * random.uniform()).floor() - 3.0;
+                [x + dx + turns * width, (y + dy).clamp(-0.25, width - 0.25)]
+            };
+            particles.set_points(&particles.points().iter().map(step).collect::<Vec<_>>()).unwrap();
+            list.update(&particles).unwrap();
+            assert_same_rows(&list, &BruteForce::build(&particles, &domain, Cutoff(cutoff)).unwrap());
+        }
+        assert!((1..30).contains(&list.rebuilds()), "{}", list.rebuilds());
+    }
+}
+
+#[test]
 fn refused_lists_and_updates_name_the_numbers_and_change_nothing() {
     let ring = Domain::periodic([0.0], [1.0]).unwrap();
     let particles = Particles::lattice([0.0], [1.0], [8]).unwrap();

@@ -4,6 +4,7 @@ use std::error::Error;
 use std::path::Path;
 
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
+use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 
 /// One curve.
@@ -183,7 +184,7 @@ fn legend<'a>(x: i32, y: i32, mark: Mark, color: RGBColor) -> DynElement<'static
         Mark::Triangles => TriangleMarker::new((x + 11, y), 7, color.filled()).into_dyn(),
         Mark::Crosses => Cross::new((x + 11, y), 6, color.stroke_width(2)).into_dyn(),
         Mark::Line => line(2),
-        Mark::Dashed => line(1),
+        Mark::Dashed => DashedPathElement::new([(x, y), (x + 22, y)], 6, 3, color.stroke_width(1)).into_dyn(),
     }
 }
 
@@ -205,9 +206,13 @@ fn bounds(curves: &[Curve], logarithmic: bool, coordinate: impl Fn(&(f64, f64)) 
 }
 
 fn power_of_ten(value: &f64) -> String {
-    if (0.1..10_000.0).contains(value) { format!("{value}") } else { format!("{value:.0e}") }
+    // Ticks are powers, and off by rounding.
+    let thousandths = (1000.0 * value).round();
+    if (100.0..1e7).contains(&thousandths) { format!("{}", thousandths / 1000.0) } else { format!("{value:.0e}") }
 }
 
 fn plain(value: &f64) -> String {
-    format!("{:.2}", value + 0.0)
+    // A tick at zero may be off by rounding, on either side.
+    let cents = (100.0 * value).round() + 0.0;
+    format!("{:.2}", 0.01 * cents)
 }

@@ -269,18 +269,26 @@ impl<Op, const R: u32, S: MomentSolver> DcPse<Op, R, S> {
     where
         Op: Operator<D>,
     {
+        self.cutoff_in(particles, &Domain::open())
+    }
+
+    /// The same with the images of a domain.
+    pub(super) fn cutoff_in<const D: usize>(&self, particles: &Particles<D>, domain: &Domain<D>) -> Result<Cutoff>
+    where
+        Op: Operator<D>,
+    {
         let (conditions, needed) = (self.most_conditions()?, self.fewest_neighbors()?);
         let h = particles.spacing()?.0;
         // A ball of radius r holds about (2 r/h)^D / 2 lattice points, for D = 1 to 3 within a factor of 1.3.
         let mut cutoff = 0.5 * h * (2.0 * needed as f64).powf(1.0 / D as f64);
         loop {
-            let cells = CellList::build(particles, &Domain::open(), Cutoff(cutoff))?;
+            let cells = CellList::build(particles, domain, Cutoff(cutoff))?;
             let counts = (0..particles.len()).map(|p| (cells.count(p, cutoff), p));
             let Some((fewest, p)) = counts.min() else { return Ok(Cutoff(cutoff)) };
             if fewest >= needed {
                 return Ok(Cutoff(cutoff));
             }
-            if fewest + 1 == particles.len() {
+            if fewest + 1 >= particles.len() {
                 let kind = OperatorError::TooFew { neighbors: fewest, conditions, needed };
                 return Err(Error::from(kind).at(p));
             }

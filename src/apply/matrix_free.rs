@@ -46,6 +46,11 @@ impl<'a, const D: usize, M: Method<D>, P: Neighbors<D>> MatrixFree<'a, D, M, P> 
         Ok(operator)
     }
 
+    /// The same without a check, for rows that are checked another time.
+    pub(crate) fn unchecked(method: &'a M, neighbors: &'a P) -> Self {
+        Self { method, neighbors, report: Report::default(), workers: Workers::new() }
+    }
+
     /// What the check of all rows found.
     pub fn report(&self) -> &Report {
         &self.report
@@ -54,7 +59,10 @@ impl<'a, const D: usize, M: Method<D>, P: Neighbors<D>> MatrixFree<'a, D, M, P> 
 
 impl<const D: usize, const K: usize, M: Method<D, Out = [f64; K]>, P: Neighbors<D>> MatrixFree<'_, D, M, P> {
     /// Fills row after row and hands each to `row`, which gives its result.
-    pub(super) fn each<T: Send>(
+    ///
+    /// # Errors
+    /// Naming the target without a row.
+    pub(crate) fn each<T: Send>(
         &self,
         out: &mut [T],
         row: impl Fn(usize, &Draft<D, [f64; K]>) -> T + Sync + Send,

@@ -9,6 +9,8 @@ mod fields;
 mod histogram;
 mod hyperviscosity;
 mod matrix_free;
+mod moving;
+mod pairs;
 mod report;
 mod rows;
 #[cfg(feature = "serde")]
@@ -28,6 +30,7 @@ pub use export::RawRows;
 pub use histogram::Histogram;
 pub use hyperviscosity::Hyperviscosity;
 pub use matrix_free::MatrixFree;
+pub use moving::MovingMethod;
 pub use report::Report;
 pub use rows::{Row, Rows};
 pub use sided::SidedRows;

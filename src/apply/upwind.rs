@@ -112,9 +112,8 @@ impl<const D: usize, T: Field> UpwindRows<D, T> {
             |(sum, served), w, difference| {
                 let mut weight = T::zero();
                 for ((&w, &v), served) in w.iter().zip(v).zip(served) {
-                    let product = w * v;
-                    if product < T::zero() {
-                        weight += product;
+                    if serves(w, v) {
+                        weight += w * v;
                         *served = true;
                     }
                 }
@@ -128,7 +127,7 @@ impl<const D: usize, T: Field> UpwindRows<D, T> {
     fn named(&self, error: Error, v: &[[T; D]]) -> Error {
         let Some(p) = error.particle() else { return error };
         let (Some(v), Some(row)) = (v.get(p), self.0.row(p)) else { return error };
-        let served = |axis: usize| row.weights.iter().any(|w| w[axis] * v[axis] < T::zero());
+        let served = |axis: usize| row.weights.iter().any(|w| serves(w[axis], v[axis]));
         for (axis, &v) in v.iter().enumerate() {
             if let Some(side) = Side::upwind(v.as_()).filter(|_| !served(axis)) {
                 return Error::from(OperatorError::EmptySide { axis, side, neighbors: row.sources.len() }).at(p);
@@ -136,4 +135,10 @@ impl<const D: usize, T: Field> UpwindRows<D, T> {
         }
         error
     }
+}
+
+/// Whether a weight belongs to the side that v comes from. Their product would say so too, but for the smallest v.
+#[inline(always)]
+fn serves<T: Field>(w: T, v: T) -> bool {
+    (w < T::zero() && v > T::zero()) || (w > T::zero() && v < T::zero())
 }

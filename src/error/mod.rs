@@ -11,6 +11,7 @@ mod multi_index;
 mod neighbor;
 mod operator;
 mod particle;
+mod solver;
 mod time;
 
 pub use apply::ApplyError;
@@ -24,6 +25,7 @@ pub use multi_index::MultiIndexError;
 pub use neighbor::NeighborError;
 pub use operator::OperatorError;
 pub use particle::ParticleError;
+pub use solver::{Limit, SolverError};
 pub use time::TimeError;
 
 use std::fmt;
@@ -134,6 +136,7 @@ impl fmt::Display for ErrorKind {
             ErrorKind::Linear(kind) => kind.fmt(f),
             ErrorKind::Boundary(kind) => kind.fmt(f),
             ErrorKind::Time(kind) => kind.fmt(f),
+            ErrorKind::Solver(kind) => kind.fmt(f),
             ErrorKind::User { code } => write!(f, "the caller's own error, code {code}"),
         }
     }
@@ -169,6 +172,8 @@ pub enum ErrorKind {
     Boundary(BoundaryError),
     /// Steppers and step limits.
     Time(TimeError),
+    /// Solvers: scenes and their steps.
+    Solver(SolverError),
     /// An error made by the caller's own code, see [`Error::user`].
     User {
         /// The number the caller chose.
@@ -204,4 +209,5 @@ from_kind! {
     Linear: LinearError,
     Boundary: BoundaryError,
     Time: TimeError,
+    Solver: SolverError,
 }

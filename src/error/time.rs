@@ -31,6 +31,15 @@ kinds! {
             /// The limit.
             limit: f64,
         } => "step {dt} is above the stability limit {limit}",
+        /// A number of stages that is not legal, or too large for the rows.
+        Stages {
+            /// Number of stages.
+            stages: u32,
+            /// Smallest legal number.
+            low: u32,
+            /// Largest legal number.
+            high: u32,
+        } => "{stages} stages are outside {low} to {high}",
         /// A right-hand side or state that is not finite.
         NotFinite {
             /// Stage of the stepper, from 1; one past the last for the new state.

@@ -101,7 +101,8 @@ impl<const P: usize, const R: usize> Lambda<P, R> {
     /// sum_n n (n-1) ... (n-m+1) c_n u^(n-m) on the piece of |s|, odd derivatives with the sign of s.
     fn differentiated<T: Scalar>(&self, degree: u32, s: T) -> T {
         let distance = s.abs();
-        let Some(j) = (0..Self::REACH).find(|&j| distance < T::lift((j + 1) as f64)) else { return T::zero() };
+        // Written so that NaN stays.
+        let Some(j) = (0..Self::REACH).find(|&j| !(distance >= T::lift((j + 1) as f64))) else { return T::zero() };
         let u = (distance - T::lift(j as f64)) - T::lift(0.5);
         let degree = degree as usize;
         let mut sum = T::zero();

@@ -63,7 +63,7 @@ const BLOCK: usize = 64;
     note = "the kernel, the operator, the particles and the provider must agree on the number of dimensions"
 )]
 pub trait Kernel<T: Scalar, const D: usize>: Send + Sync {
-    /// eta(z).
+    /// eta(z). Far beyond the support, where powers of |z| overflow, it may be NaN in place of 0.
     fn value(&self, z: &[T; D]) -> T;
 
     /// eta at many points; `out` is as long as `z`. Override it where many points are cheaper together.

@@ -133,7 +133,8 @@ fn derive(degree: u32, order: u32) -> Option<Vec<Twofold>> {
 impl<T: Scalar, const D: usize> Kernel<T, D> for OneSidedGaussian<D> {
     fn value(&self, z: &[T; D]) -> T {
         let along = if self.side == Side::Left { z[self.axis] } else { -z[self.axis] };
-        if !(along > T::zero()) {
+        // Written so that NaN stays.
+        if along <= T::zero() {
             return T::zero();
         }
         let mut product = horner(&self.coefficients, along) * along * T::lift(self.front);

@@ -1,19 +1,11 @@
 //! Restarted GMRES with an incomplete factor on the right.
 
 use super::ilu::{Ilu0, check_length};
+use super::norm::{dot, inverse_power, norm};
+use super::stop::{SolveReport, Stop, check_right, check_solution};
 use crate::apply::Apply;
-use crate::error::{ApplyError, Error, LinearError, Result};
+use crate::error::{LinearError, Result};
 use crate::particles::reserved;
-
-/// What a solve of A x = b did.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[non_exhaustive]
-pub struct SolveReport {
-    /// Products with A, those for the final residual not counted; steps of refinement where A was factored.
-    pub iterations: usize,
-    /// The relative residual |b - A x|_2 / |b|_2, computed from x itself; 0 for b = 0.
-    pub residual: f64,
-}
 
 /// GMRES(m): the x of least residual |b - A x|_2 in a growing Krylov space, restarted every m iterations.
 ///
@@ -40,8 +32,7 @@ pub struct SolveReport {
 #[derive(Clone, Debug)]
 pub struct Gmres {
     restart: usize,
-    most: usize,
-    tolerance: f64,
+    stop: Stop,
     /// The orthonormal vectors, one after the other.
     basis: Vec<f64>,
     /// The triangular factor of the projected matrix, column by column, m + 1 places each.
@@ -64,8 +55,7 @@ impl Gmres {
     pub fn new() -> Self {
         Self {
             restart: 60,
-            most: 3000,
-            tolerance: 1e-13,
+            stop: Stop::DEFAULT,
             basis: Vec::new(),
             triangle: Vec::new(),
             rotations: Vec::new(),
@@ -84,7 +74,7 @@ impl Gmres {
     /// With at most so many iterations.
     #[must_use]
     pub fn most(self, iterations: usize) -> Self {
-        Self { most: iterations, ..self }
+        Self { stop: Stop { most: iterations, ..self.stop }, ..self }
     }
 
     /// With this relative residual to be reached.
@@ -92,11 +82,7 @@ impl Gmres {
     /// # Errors
     /// [`LinearError::Setting`] where it is not in (0, 1).
     pub fn tolerance(self, residual: f64) -> Result<Self> {
-        if residual > 0.0 && residual < 1.0 {
-            Ok(Self { tolerance: residual, ..self })
-        } else {
-            Err(LinearError::Setting { value: residual, low: 0.0, high: 1.0 }.into())
-        }
+        Ok(Self { stop: self.stop.at(residual)?, ..self })
     }
 
     /// Solves A x = b from x = 0, for a matrix or any other operator with as many targets as sources.
@@ -105,7 +91,7 @@ impl Gmres {
     /// [`LinearError::NotSquare`] and [`LinearError::Length`] where shapes do not fit; [`LinearError::Value`] naming the
     /// first entry of `b` that is not finite; [`LinearError::NotConverged`] where the residual is above the tolerance
     /// after the last iteration, or when a restart no longer lowers it (`x` then holds what was reached);
-    /// [`ApplyError::Overflow`] where the solution is not finite; and the errors of the operator.
+    /// [`ApplyError::Overflow`](crate::ApplyError::Overflow) where the solution is not finite; and the errors of the operator.
     pub fn solve(
         &mut self,
         a: &(impl Apply<f64> + ?Sized),
@@ -120,21 +106,20 @@ impl Gmres {
         check_length(preconditioner.map_or(rows, Ilu0::rows), rows)?;
         check_length(b.len(), rows)?;
         let precondition = |x: &mut [f64]| preconditioner.map_or(Ok(()), |factors| factors.solve(x));
+        check_length(x.len(), rows)?;
+        check_right(b)?;
+        x.fill(0.0);
         let report = self.run(|x, y| a.apply(x, y), precondition, b, x)?;
-        self.accept(report)
+        self.stop.accept(report)
     }
 
-    /// Refuses a report above the tolerance.
-    pub(super) fn accept(&self, report: SolveReport) -> Result<SolveReport> {
-        let (SolveReport { iterations, residual }, tolerance) = (report, self.tolerance);
-        if residual <= tolerance {
-            Ok(report)
-        } else {
-            Err(LinearError::NotConverged { iterations, residual, tolerance }.into())
-        }
+    /// Which residual is asked for.
+    pub(super) fn stop(&self) -> Stop {
+        self.stop
     }
 
-    /// Iterates until the tolerance, the last iteration, or until nothing is gained; the report says how far it came.
+    /// Iterates from x until the tolerance, the last iteration, or until nothing is gained; the report says how far it
+    /// came. Where the start is within the tolerance but not exact, it is still corrected once.
     pub(super) fn run(
         &mut self,
         product: impl Fn(&[f64], &mut [f64]) -> Result<()>,
@@ -143,25 +128,29 @@ impl Gmres {
         x: &mut [f64],
     ) -> Result<SolveReport> {
         let n = b.len();
-        check_length(x.len(), n)?;
-        if let Some((p, &value)) = b.iter().enumerate().find(|(_, value)| !value.is_finite()) {
-            return Err(Error::from(LinearError::Value { value }).at(p));
-        }
-        x.fill(0.0);
         let largest = b.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
         if largest == 0.0 {
+            x.fill(0.0);
             return Ok(SolveReport::default());
         }
         self.reserve(n)?;
         let scale = inverse_power(largest);
         self.scaled.iter_mut().zip(b).for_each(|(scaled, value)| *scaled = value * scale);
         let full = norm(&self.scaled);
-        let goal = self.tolerance * full;
+        let goal = self.stop.tolerance * full;
         self.basis.clear();
         self.basis.extend_from_slice(&self.scaled);
-        let (mut left, mut iterations) = (full, 0);
-        while left > goal && iterations < self.most {
-            let steps = self.cycle(left, goal, self.most - iterations, &product, &precondition)?;
+        if x.iter().any(|&x| x != 0.0) {
+            product(x, &mut self.work)?;
+            if self.work == b {
+                return Ok(SolveReport::default());
+            }
+            self.basis.iter_mut().zip(&self.work).for_each(|(b, ax)| *b -= scale * ax);
+            x.iter_mut().for_each(|x| *x *= scale);
+        }
+        let (mut left, mut iterations) = (norm(&self.basis), 0);
+        while left > 0.0 && (left > goal || iterations == 0) && iterations < self.stop.most {
+            let steps = self.cycle(left, goal, self.stop.most - iterations, &product, &precondition)?;
             iterations += steps.done;
             self.combine(n, steps.kept);
             precondition(&mut self.work)?;
@@ -178,15 +167,13 @@ impl Gmres {
             }
         }
         x.iter_mut().for_each(|x| *x /= scale);
-        if let Some((p, &value)) = x.iter().enumerate().find(|(_, value)| !value.is_finite()) {
-            return Err(Error::from(ApplyError::Overflow { value }).at(p));
-        }
+        check_solution(x)?;
         Ok(SolveReport { iterations, residual: left / full })
     }
 
     /// The most vectors of one cycle that take part in a solution.
     fn width(&self, n: usize) -> usize {
-        self.restart.min(self.most).min(n)
+        self.restart.min(self.stop.most).min(n)
     }
 
     /// Room for all that a solve of n unknowns can need.
@@ -289,44 +276,4 @@ fn orthogonalize(known: &[f64], next: &mut [f64], parts: &mut [f64]) {
             next.iter_mut().zip(vector).for_each(|(value, v)| *value -= along * v);
         }
     }
-}
-
-/// The inner product, in four sums so that they run side by side.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
-    let mut sums = [0.0; 4];
-    for (a, b) in a.iter().zip(b) {
-        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
-            *sum += a * b;
-        }
-    }
-    let rest = a_rest.iter().zip(b_rest).fold(0.0, |sum, (a, b)| sum + a * b);
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
-}
-
-/// A sum of squares above which none that counts is subnormal.
-const LEAST_SQUARE: f64 = 1e-250;
-
-/// The Euclidean norm, of vectors of any scale: b is scaled, A need not be.
-fn norm(x: &[f64]) -> f64 {
-    let square = dot(x, x);
-    if square > LEAST_SQUARE && square.is_finite() {
-        return square.sqrt();
-    }
-    let scale = inverse_power(x.iter().fold(0.0, |largest, x| x.abs().max(largest)));
-    x.iter().fold(0.0, |sum, x| sum + (x * scale) * (x * scale)).sqrt() / scale
-}
-
-/// The power of two that brings a positive number into [1, 2), as far as normal numbers reach.
-pub(super) fn inverse_power(x: f64) -> f64 {
-    let exponent = ((x.to_bits() >> 52) as i64 - 1023).clamp(-1000, 1000);
-    f64::from_bits(((1023 - exponent) as u64) << 52)
-}
-
-/// |a|_2 / |b|_2 for vectors of any scale.
-pub(super) fn ratio(a: &[f64], b: &[f64]) -> f64 {
-    let largest = |x: &[f64]| x.iter().fold(f64::MIN_POSITIVE, |largest, x| largest.max(x.abs()));
-    let scale = inverse_power(largest(a).max(largest(b)));
-    let norm = |x: &[f64]| x.iter().fold(0.0, |sum, x| sum + (x * scale) * (x * scale)).sqrt();
-    norm(a) / norm(b)
 }

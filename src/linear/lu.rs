@@ -8,8 +8,9 @@ use faer::sparse::linalg::lu::{LuRef, NumericLu, SymbolicLu, factorize_symbolic_
 use faer::{Conj, MatMut, Par};
 
 use super::csr::CsrMatrix;
-use super::gmres::{SolveReport, ratio};
-use crate::error::{ApplyError, Error, LinearError, ParticleError, Result};
+use super::norm::ratio;
+use super::stop::{SolveReport, check_solution};
+use crate::error::{Error, LinearError, ParticleError, Result};
 
 /// Most steps of refinement in one solve.
 const REFINEMENTS: usize = 3;
@@ -67,7 +68,7 @@ impl SparseLu {
         }
     }
 
-    /// Solves A x = b with at least one step of refinement, until the residual is below its bound.
+    /// Solves A x = b from x with at least one step of refinement, until the residual is below its bound.
     pub(super) fn refined(
         &mut self,
         matrix: &CsrMatrix,
@@ -76,19 +77,21 @@ impl SparseLu {
         [residual, work]: &mut [Vec<f64>; 2],
         floor: impl Fn(&CsrMatrix, &[f64], &[f64], &mut [f64]) -> f64,
     ) -> Result<SolveReport> {
-        x.fill(0.0);
         if b.iter().all(|&b| b == 0.0) {
+            x.fill(0.0);
             return Ok(SolveReport::default());
         }
         residual.copy_from_slice(b);
+        if x.iter().any(|&x| x != 0.0) {
+            matrix.product(x, work);
+            residual.iter_mut().zip(&*work).for_each(|(r, ax)| *r -= ax);
+        }
         let mut iterations = 0;
         loop {
             // The first pass solves, those after it refine.
             self.solve(residual, false);
             x.iter_mut().zip(&*residual).for_each(|(x, step)| *x += step);
-            if let Some((p, &value)) = x.iter().enumerate().find(|(_, value)| !value.is_finite()) {
-                return Err(Error::from(ApplyError::Overflow { value }).at(p));
-            }
+            check_solution(x)?;
             matrix.product(x, work);
             residual.iter_mut().zip(b.iter().zip(&*work)).for_each(|(r, (b, ax))| *r = b - ax);
             let left = ratio(residual, b);

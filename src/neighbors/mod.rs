@@ -12,6 +12,7 @@ mod list;
 mod measure;
 mod nearest;
 mod order;
+mod overlap;
 mod pair;
 mod placed;
 mod row_check;
@@ -30,6 +31,7 @@ pub use half::HalfList;
 pub use list::NeighborList;
 pub use measure::{epsilon_from_neighbors, mean_neighbor_distance, volumes_from_neighbors};
 pub use nearest::Nearest;
+pub use overlap::{fill_distance, least_gap};
 pub use pair::{Pair, Symmetry};
 pub use selected::Selected;
 #[cfg(feature = "kiddo")]

@@ -153,6 +153,12 @@ impl<const D: usize> VerletList<D> {
         self.skin
     }
 
+    /// Where the particles were when the rows were last searched: a list built there and updated to the places of now has
+    /// the rows of this one in the same order.
+    pub fn searched_at(&self) -> &[[f64; D]] {
+        &self.searched_at
+    }
+
     /// How often an update has searched the rows anew.
     pub fn rebuilds(&self) -> usize {
         self.rebuilds

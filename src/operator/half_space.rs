@@ -230,6 +230,11 @@ macro_rules! half_space_settings {
                 self
             }
 
+            /// The smoothing length.
+            pub fn epsilon(&self) -> &Epsilon {
+                &self.half.epsilon
+            }
+
             /// The cutoff a provider must be built with: the support radius times the largest epsilon.
             pub fn cutoff(&self) -> Cutoff {
                 self.half.epsilon.cutoff(self.half.support)

@@ -31,6 +31,13 @@ pub enum Form {
     Strengths,
 }
 
+/// The order of a method, its smallest epsilon, and the largest legal h/epsilon.
+pub(crate) struct Design {
+    pub(crate) order: u32,
+    pub(crate) epsilon: f64,
+    pub(crate) overlap_limit: f64,
+}
+
 /// Particle strength exchange with N outputs,
 /// (Q f)_p = epsilon^-m sum_q V_q (f_q -/+ f_p) eta_epsilon(x_p - x_q), eta_epsilon(x) = epsilon^-D eta(x/epsilon).
 ///
@@ -135,6 +142,20 @@ impl<K, const N: usize> Pse<K, N> {
             Sign::Plus => Pairing::Sum,
         };
         Ok(self)
+    }
+
+    /// What a lattice must have for this method.
+    pub(crate) fn design<const D: usize>(&self) -> Design
+    where
+        K: Kernel<f64, D>,
+    {
+        let order = self.0.kernels.iter().map(Kernel::<f64, D>::order).min().unwrap_or(0);
+        Design { order, epsilon: self.0.epsilon.range().0, overlap_limit: self.0.overlap_limit }
+    }
+
+    /// Takes other volumes.
+    pub(crate) fn replace_volumes(&mut self, volumes: &Volumes) {
+        self.0.volumes = volumes.clone();
     }
 
     /// Sets what the rows act on.

@@ -6,39 +6,57 @@ use nalgebra::SVector;
 ///
 /// The factor a of x + a y comes as `f64` and is rounded once to the precision of the entry.
 pub trait Entry: Copy + Send + Sync + 'static {
+    /// How many numbers an entry has.
+    const NUMBERS: usize;
+
     /// self + a y, every number in its own precision.
     #[must_use]
     fn plus(self, a: f64, y: Self) -> Self;
 
     /// Whether every number is finite.
     fn finite(self) -> bool;
+
+    /// Number k; k is below [`NUMBERS`](Self::NUMBERS).
+    fn number(&self, k: usize) -> f64;
+
+    /// Gives number k this value, rounded once; k is below [`NUMBERS`](Self::NUMBERS).
+    fn set_number(&mut self, k: usize, value: f64);
 }
 
-impl Entry for f64 {
-    #[inline(always)]
-    fn plus(self, a: f64, y: Self) -> Self {
-        self + a * y
-    }
+macro_rules! entry_of_a_number {
+    ($number:ty) => {
+        impl Entry for $number {
+            const NUMBERS: usize = 1;
 
-    #[inline(always)]
-    fn finite(self) -> bool {
-        self.is_finite()
-    }
+            #[inline(always)]
+            fn plus(self, a: f64, y: Self) -> Self {
+                self + a as $number * y
+            }
+
+            #[inline(always)]
+            fn finite(self) -> bool {
+                self.is_finite()
+            }
+
+            #[inline(always)]
+            fn number(&self, _: usize) -> f64 {
+                f64::from(*self)
+            }
+
+            #[inline(always)]
+            fn set_number(&mut self, _: usize, value: f64) {
+                *self = value as $number;
+            }
+        }
+    };
 }
 
-impl Entry for f32 {
-    #[inline(always)]
-    fn plus(self, a: f64, y: Self) -> Self {
-        self + a as f32 * y
-    }
-
-    #[inline(always)]
-    fn finite(self) -> bool {
-        self.is_finite()
-    }
-}
+entry_of_a_number!(f64);
+entry_of_a_number!(f32);
 
 impl<E: Entry, const K: usize> Entry for [E; K] {
+    const NUMBERS: usize = K * E::NUMBERS;
+
     #[inline(always)]
     fn plus(self, a: f64, y: Self) -> Self {
         std::array::from_fn(|k| self[k].plus(a, y[k]))
@@ -48,9 +66,21 @@ impl<E: Entry, const K: usize> Entry for [E; K] {
     fn finite(self) -> bool {
         self.iter().fold(true, |all, x| all & x.finite())
     }
+
+    #[inline(always)]
+    fn number(&self, k: usize) -> f64 {
+        self[k / E::NUMBERS].number(k % E::NUMBERS)
+    }
+
+    #[inline(always)]
+    fn set_number(&mut self, k: usize, value: f64) {
+        self[k / E::NUMBERS].set_number(k % E::NUMBERS, value);
+    }
 }
 
 impl<E: Entry + nalgebra::Scalar, const K: usize> Entry for SVector<E, K> {
+    const NUMBERS: usize = K * E::NUMBERS;
+
     #[inline(always)]
     fn plus(self, a: f64, y: Self) -> Self {
         self.zip_map(&y, |x, y| x.plus(a, y))
@@ -59,6 +89,16 @@ impl<E: Entry + nalgebra::Scalar, const K: usize> Entry for SVector<E, K> {
     #[inline(always)]
     fn finite(self) -> bool {
         self.iter().fold(true, |all, x| all & x.finite())
+    }
+
+    #[inline(always)]
+    fn number(&self, k: usize) -> f64 {
+        self[k / E::NUMBERS].number(k % E::NUMBERS)
+    }
+
+    #[inline(always)]
+    fn set_number(&mut self, k: usize, value: f64) {
+        self[k / E::NUMBERS].set_number(k % E::NUMBERS, value);
     }
 }
 

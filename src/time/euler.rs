@@ -23,8 +23,12 @@ use crate::error::Result;
 /// Source: notes 001, eq. 3.8 and 3.46.
 /// See also: [`Rk4`](crate::Rk4), which also bears central advection.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct Euler<S> {
+    #[cfg_attr(feature = "serde", serde(skip))]
     du: Option<S>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     next: Option<S>,
 }
 

@@ -27,9 +27,16 @@ use crate::error::Result;
 /// Source: notes 001, eq. 3.13; errata 52 (the old state must be kept) and 53 (start and limit).
 /// See also: [`Rk4`](crate::Rk4), which bears diffusion too.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(serialize = "S: serde::Serialize", deserialize = "S: serde::Deserialize<'de>"))
+)]
 pub struct Leapfrog<S> {
+    #[cfg_attr(feature = "serde", serde(skip))]
     du: Option<S>,
     old: Option<S>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     next: Option<S>,
     /// dt of the last step and the time it ended at, while `old` holds the state before it.
     last: Option<(f64, f64)>,

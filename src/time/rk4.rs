@@ -15,9 +15,14 @@ const NEGATIVE_REAL: f64 = 2.785293563405282;
 ///
 /// Source: notes 001, eq. 3.17 to 3.21; errata 56 for the intervals. Example: [`Stepper`].
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct Rk4<S> {
+    #[cfg_attr(feature = "serde", serde(skip))]
     k: Option<S>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     stage: Option<S>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     next: Option<S>,
 }
 

@@ -1,5 +1,6 @@
 //! The seam of every time stepping scheme, and the checks all of them share.
 
+use super::rkl2::RowSymmetry;
 use super::state::State;
 use crate::error::{Error, Result, TimeError};
 
@@ -43,6 +44,15 @@ pub trait Stepper<S: State> {
     /// [`TimeError::Shape`] where `rhs` changed the shape of `du`; and the errors of `rhs`, unchanged.
     fn step(&mut self, t: f64, dt: f64, u: &mut S, rhs: &mut Rhs<'_, S>) -> Result<()>;
 
+    /// Refuses rows that the scheme does not suit, for what is known of them; most schemes suit all.
+    ///
+    /// # Errors
+    /// [`TimeError::Stages`] for more stages of [`Rkl2`](crate::Rkl2) than rows that are not symmetric bear.
+    fn check_symmetry(&self, symmetry: RowSymmetry) -> Result<()> {
+        let _ = symmetry;
+        Ok(())
+    }
+
     /// Forgets all earlier steps; call it when `u` was changed between two steps of a multistep scheme.
     fn reset(&mut self) {}
 }
@@ -62,6 +72,10 @@ impl<S: State, P: Stepper<S> + ?Sized> Stepper<S> for Box<P> {
 
     fn step(&mut self, t: f64, dt: f64, u: &mut S, rhs: &mut Rhs<'_, S>) -> Result<()> {
         (**self).step(t, dt, u, rhs)
+    }
+
+    fn check_symmetry(&self, symmetry: RowSymmetry) -> Result<()> {
+        (**self).check_symmetry(symmetry)
     }
 
     fn reset(&mut self) {

@@ -203,6 +203,11 @@ impl<Op, const R: u32, S> DcPse<Op, R, S> {
         Ok(self.settings.fewest(self.most_conditions()?))
     }
 
+    /// The convergence order asked for.
+    pub(crate) fn own_order(&self) -> u32 {
+        self.settings.order
+    }
+
     /// l of the largest system at a particle.
     pub(crate) fn most_conditions<const D: usize>(&self) -> Result<usize>
     where

@@ -1,0 +1,26 @@
+//! The pairs of one row, for sums that live outside this layer.
+
+use super::Field;
+use super::rows::Rows;
+
+impl<const K: usize, T: Field> Rows<[f64; K], T> {
+    /// The diagonal of row p, where it is not zero throughout, and its pairs (q, w_pq) in the order of summation.
+    #[inline(always)]
+    pub(crate) fn pairs(&self, p: usize) -> (Option<[T; K]>, impl Iterator<Item = (usize, [T; K])>) {
+        let range = self.offsets[p]..self.offsets[p + 1];
+        let pairs = self.columns[range.clone()].iter().zip(&self.weights[range]);
+        (self.diagonal.get(p).copied(), pairs.map(|(&q, &w)| (q as usize, w)))
+    }
+
+    /// The matrix entries (q, A_pq) of row p, where target p is source p, each the contraction of its K weights.
+    pub(crate) fn entries_of(&self, p: usize, contract: impl Fn([f64; K]) -> f64, entry: &mut dyn FnMut(usize, f64)) {
+        let (diagonal, pairs) = self.pairs(p);
+        let mut own = diagonal.map_or(0.0, |d| contract(d.map(|d| d.as_())));
+        for (q, w) in pairs {
+            let w = contract(w.map(|w| w.as_()));
+            own -= w;
+            entry(q, w);
+        }
+        entry(p, own);
+    }
+}

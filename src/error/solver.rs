@@ -1,0 +1,195 @@
+//! Why solvers refuse scenes and steps.
+
+use std::fmt;
+
+use super::kinds;
+
+/// What bounds the step of a solver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Limit {
+    /// The diffusion term: D dt lambda_max of the actual rows.
+    Diffusion,
+    /// The advection term: the CFL condition of the actual rows.
+    Advection,
+    /// Compression of the flow: u div v.
+    Compression,
+    /// The source term: dS/du.
+    Source,
+    /// Hyperviscosity.
+    Hyperviscosity,
+    /// Distortion of a moving set: dt times the largest singular value of grad v, the Lagrangian CFL condition.
+    Distortion,
+}
+
+impl Limit {
+    /// All of them, in the order of their declaration.
+    pub const ALL: [Self; 6] =
+        [Self::Diffusion, Self::Advection, Self::Compression, Self::Source, Self::Hyperviscosity, Self::Distortion];
+
+    /// Its name, in one lower-case word.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Diffusion => "diffusion",
+            Self::Advection => "advection",
+            Self::Compression => "compression",
+            Self::Source => "source",
+            Self::Hyperviscosity => "hyperviscosity",
+            Self::Distortion => "distortion",
+        }
+    }
+}
+
+impl fmt::Display for Limit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+kinds! {
+    /// Refusals of the advection-diffusion solvers.
+    SolverError {
+        /// A step above the limit of the moment.
+        Limit {
+            /// The step.
+            dt: f64,
+            /// The largest legal step.
+            limit: f64,
+            /// What binds it.
+            binding: Limit,
+        } => "step {dt} is above {limit}, to which {binding} binds it",
+        /// More substeps than allowed would be needed.
+        Substeps {
+            /// The step.
+            dt: f64,
+            /// The largest legal step.
+            limit: f64,
+            /// What binds it.
+            binding: Limit,
+            /// The most substeps allowed.
+            most: u32,
+        } => "step {dt} is above {limit}, to which {binding} binds it, by more than {most} substeps make up for",
+        /// A term no step is stable for with this stepper.
+        Unstable {
+            /// The term.
+            term: Limit,
+            /// The largest decay rate of a mode, in 1/time.
+            decay: f64,
+            /// The largest frequency of a mode, in 1/time.
+            oscillation: f64,
+            /// The negative real interval of the stepper.
+            negative_real: f64,
+            /// The imaginary interval of the stepper.
+            imaginary: f64,
+        } => "no step is stable for {term}: modes decay at up to {decay} and oscillate at up to {oscillation}, the stepper is stable to {negative_real} on the real and {imaginary} on the imaginary axis",
+        /// Modes that grow whatever the step.
+        Growing {
+            /// The largest growth rate found, in 1/time.
+            rate: f64,
+            /// The spectral radius.
+            radius: f64,
+            /// The largest legal rate over radius.
+            limit: f64,
+        } => "modes grow at the rate {rate}, above {limit:e} of the spectral radius {radius}",
+        /// Rows of the diffusion term whose coefficients make modes grow with every stepper.
+        Contrast {
+            /// The contrast of the diffusivities in the stencil.
+            contrast: f64,
+        } => "an arithmetic mean across a contrast of {contrast} grows at orders above 2",
+        /// A set whose targets are not its particles, each in its place.
+        Targets {
+            /// Targets of the provider.
+            targets: usize,
+            /// Particles of the set.
+            particles: usize,
+        } => "the {targets} targets of the provider are not the {particles} particles",
+        /// A velocity that is not finite.
+        Velocity {
+            /// Axis.
+            axis: usize,
+            /// The component.
+            value: f64,
+            /// Time.
+            t: f64,
+        } => "component {axis} of the velocity at t = {t} is {value}",
+        /// A gradient of the velocity that is not finite.
+        VelocityGradient {
+            /// Its largest singular value.
+            value: f64,
+            /// Time.
+            t: f64,
+        } => "the largest singular value of the velocity gradient at t = {t} is {value}",
+        /// A divergence of the velocity that is not finite.
+        Divergence {
+            /// The divergence.
+            value: f64,
+            /// Time.
+            t: f64,
+        } => "the divergence of the velocity at t = {t} is {value}",
+        /// A source, or its change with u, that is not finite.
+        Source {
+            /// The field.
+            field: usize,
+            /// Time.
+            t: f64,
+        } => "the source of field {field} at t = {t} is not finite",
+        /// A velocity that depends on time, where a scene is to be at rest.
+        Unsteady {
+            /// The time at which it was asked for.
+            t: f64,
+        } => "the velocity depends on time: nothing is at rest at t = {t}",
+        /// A source that is not affine in u, where a steady problem needs one.
+        NotAffine {
+            /// The source at u = 2.
+            found: f64,
+            /// What an affine source would have there.
+            expected: f64,
+        } => "the source at u = 2 is {found}, where one affine in u would be {expected}",
+        /// No neighbor upstream, and no inflow condition.
+        NoUpstream {
+            /// Axis along which the flow comes in, or the nearest one.
+            axis: usize,
+            /// The velocity along it.
+            velocity: f64,
+        } => "nothing lies upstream along axis {axis}, where the velocity is {velocity}: an inflow condition is needed",
+        /// A volume of a moving particle that is not positive: it was compressed to nothing within a step.
+        Volume {
+            /// The volume.
+            volume: f64,
+            /// Time.
+            t: f64,
+        } => "the volume at t = {t} is {volume}, it must stay positive",
+        /// The scheme of particles that move, where they stay.
+        Stays {
+            /// Number of particles.
+            particles: usize,
+        } => "the scheme is that of moving particles, these {particles} stay: name a scheme for v . grad u",
+        /// A constant of the Lagrangian CFL condition that is not between 0 and 1.
+        Courant {
+            /// The constant.
+            constant: f64,
+        } => "dt times the largest singular value of grad v must stay below a number between 0 and 1, not {constant}",
+        /// A remeshing kernel of less exactness than the order of the operator.
+        Exactness {
+            /// Exactness P of the kernel.
+            exactness: u32,
+            /// Order r of the operator.
+            order: u32,
+        } => "remeshing with exactness {exactness} would spoil the order {order} of the operator",
+        /// A remeshing mesh whose axis is not that of the domain.
+        MeshAxis {
+            /// Axis.
+            axis: usize,
+            /// Faces of the mesh.
+            mesh: [f64; 2],
+            /// Faces of the domain.
+            domain: [f64; 2],
+        } => "axis {axis}: the mesh from {mesh:?} is not periodic where the domain from {domain:?} is, or the other way round, or with another period",
+        /// A remeshing trigger that would never, or always, be met.
+        Trigger {
+            /// Its number.
+            value: f64,
+        } => "remeshing cannot be triggered by {value}",
+    }
+}

@@ -1,0 +1,55 @@
+//! Whether modes of a scene grow, whatever the step.
+
+use super::fields::Fields;
+use super::scene::Scene;
+use super::semi_discrete::SemiDiscrete;
+use crate::error::{Result, SolverError};
+use crate::linear::{Spectrum, SpectrumEstimator};
+
+/// The largest legal growth rate over the spectral radius, for `f64` rows; for `f32` what their rounding moves eigenvalues
+/// by, if that is more.
+const LIMIT: f64 = 1e-8;
+
+/// Products after which the estimate is taken as it is.
+const MOST: usize = 1000;
+
+impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
+    /// The rightmost eigenvalue and the spectral radius of the diffusion and advection terms at time t, conditions of the
+    /// boundary included with zero values; see [`SpectrumEstimator`] for what the estimate is worth. Zero without a
+    /// product where no weight of the terms is negative, for then every eigenvalue lies in a disc left of zero.
+    ///
+    /// # Errors
+    /// As [`SpectrumEstimator::estimate`].
+    pub fn spectrum(&mut self, t: f64) -> Result<Spectrum> {
+        if self.cannot_grow() {
+            return Ok(Spectrum::default());
+        }
+        let free: Vec<usize> = self.site().free().map(|(p, _)| p).collect();
+        let count = self.site().points().len();
+        let (mut field, mut rate) = (vec![S::Value::ZERO; count], vec![S::Value::ZERO; count]);
+        // Values beyond the range of f32 never come up: the vectors of the search have unit length.
+        SpectrumEstimator::new().most(MOST).estimate(free.len(), |u, du| {
+            free.iter().zip(u).for_each(|(&p, &u)| field[p].set(0, u));
+            self.linear(t, &mut field, &mut rate)?;
+            free.iter().zip(du).for_each(|(&p, du)| *du = rate[p].get(0));
+            Ok(())
+        })
+    }
+
+    /// Refuses a spectrum with modes that are known to grow, and returns their rate otherwise.
+    ///
+    /// # Errors
+    /// [`SolverError::Growing`].
+    pub(super) fn check_growth(spectrum: &Spectrum) -> Result<f64> {
+        let limit = LIMIT.max(ROUNDING * S::Value::EPSILON);
+        // What the residual leaves open is no proof of growth.
+        if spectrum.abscissa - spectrum.residual > limit * spectrum.radius {
+            let (rate, radius) = (spectrum.abscissa, spectrum.radius);
+            return Err(SolverError::Growing { rate, radius, limit }.into());
+        }
+        Ok(spectrum.abscissa)
+    }
+}
+
+/// Rounding of a row of some tens of weights.
+const ROUNDING: f64 = 16.0;

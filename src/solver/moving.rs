@@ -1,0 +1,310 @@
+//! A scene on particles that move: positions, strengths and volumes, ready to be stepped.
+
+use super::fields::Fields;
+use super::flow::Flow;
+use super::limits::{Limits, Rate};
+use super::moving_diffusion::{MovingDiffusion, MovingSettings};
+use super::scene::Scene;
+use super::term::{SceneTerm, Site};
+use crate::apply::Report;
+use crate::apply::blocks::each_row;
+use crate::domain::Domain;
+use crate::error::{Error, Limit, Result, SolverError, TimeError};
+use crate::linear::Spectrum;
+use crate::particles::{Particles, Random};
+use crate::scale::Volumes;
+use crate::time::{Entry, RowSymmetry};
+
+/// What a stepper moves: positions, and strengths and volumes. What a scene leaves as it is has no entries in it.
+pub type MovingState<const D: usize, E> = (Vec<[f64; D]>, (Vec<E>, Vec<f64>));
+
+/// A scene that particles can move in: any flow, any [`MovingMethod`](crate::MovingMethod) for the diffusion, any source.
+///
+/// Conditions at boundary particles are not among it: these would have to stay. Periodic and mirror faces are those of the
+/// domain.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is no scene for moving particles in {D} dimensions",
+    label = "its diffusion must be by `Pse` or `DcPse` (any `MovingMethod`), and without conditions at boundary particles"
+)]
+pub trait MovingScene<const D: usize>:
+    Scene<
+        D,
+        Edge = (),
+        Advection: Flow<D>,
+        Diffusion: MovingDiffusion<D, Self::Value>,
+        Source: SceneTerm<D, Self::Value, Rows = ()>,
+    >
+{
+}
+
+impl<S, const D: usize> MovingScene<D> for S where
+    S: Scene<
+            D,
+            Edge = (),
+            Advection: Flow<D>,
+            Diffusion: MovingDiffusion<D, S::Value>,
+            Source: SceneTerm<D, S::Value, Rows = ()>,
+        >
+{
+}
+
+type KeptOf<const D: usize, S> = <<S as Scene<D>>::Diffusion as MovingDiffusion<D, <S as Scene<D>>::Value>>::Kept;
+type ValuesOf<const D: usize, S> = <<S as Scene<D>>::Advection as Flow<D>>::Values;
+
+/// The right-hand side. Its particles are those of the last stage; what the scene leaves as it is, it holds.
+pub(super) struct Moving<const D: usize, S: MovingScene<D>> {
+    pub(super) scene: S,
+    pub(super) domain: Domain<D>,
+    pub(super) site: Site<D>,
+    kept: KeptOf<D, S>,
+    values: ValuesOf<D, S>,
+    /// Strengths and volumes that no term changes.
+    omega: Vec<S::Value>,
+    volume: Vec<f64>,
+    u: Vec<S::Value>,
+    places: Vec<[f64; D]>,
+}
+
+impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
+    /// Whether strengths change between two remeshings.
+    const EXCHANGES: bool =
+        <S::Diffusion as MovingDiffusion<D, S::Value>>::SPREADS || <S::Source as SceneTerm<D, S::Value>>::PRESENT;
+
+    /// The particles with the values u, and their state.
+    pub(super) fn new(
+        scene: S,
+        particles: &Particles<D>,
+        u: &[S::Value],
+        domain: &Domain<D>,
+        settings: MovingSettings,
+    ) -> Result<(Self, MovingState<D, S::Value>)> {
+        let (found, needed) = (u.len(), particles.len());
+        if found != needed {
+            return Err(TimeError::Shape { found, needed }.into());
+        }
+        scene.advection_term().validate(needed)?;
+        let volumes = particles.volumes()?;
+        let volume = (0..needed).map(|p| volumes.get(p)).collect::<Result<Vec<f64>>>()?;
+        let omega = u.iter().zip(&volume).map(|(&u, &volume)| S::Value::ZERO.plus(volume, u)).collect();
+        let points = wrapped(particles.points(), domain)?;
+        let mut particles = particles.clone();
+        particles.set_points(&points)?;
+        let kept = scene.diffusion_term().start(&particles, domain, settings)?;
+        let mut moving = Self {
+            scene,
+            domain: *domain,
+            site: Site::moving(particles),
+            kept,
+            values: Default::default(),
+            omega: Vec::new(),
+            volume: Vec::new(),
+            u: Vec::new(),
+            places: Vec::new(),
+        };
+        let state = moving.take(points, omega, volume);
+        Ok((moving, state))
+    }
+
+    /// The state of these particles; what no term changes stays here.
+    fn take(&mut self, points: Vec<[f64; D]>, omega: Vec<S::Value>, volume: Vec<f64>) -> MovingState<D, S::Value> {
+        let points = if S::Advection::MOVES { points } else { Vec::new() };
+        let omega = if Self::EXCHANGES {
+            omega
+        } else {
+            self.omega = omega;
+            Vec::new()
+        };
+        let volume = if S::Advection::SOLENOIDAL {
+            self.volume = volume;
+            Vec::new()
+        } else {
+            volume
+        };
+        (points, (omega, volume))
+    }
+
+    /// Other particles with these strengths in the place of those there were.
+    pub(super) fn replace(
+        &mut self,
+        particles: Particles<D>,
+        omega: Vec<S::Value>,
+        kept: KeptOf<D, S>,
+    ) -> Result<MovingState<D, S::Value>> {
+        let volumes = particles.volumes()?;
+        let volume = (0..particles.len()).map(|p| volumes.get(p)).collect::<Result<Vec<f64>>>()?;
+        let points = particles.points().to_vec();
+        self.kept = kept;
+        self.values = Default::default();
+        self.site = Site::moving(particles);
+        Ok(self.take(points, omega, volume))
+    }
+
+    /// The neighbors of other particles, with the settings of now.
+    pub(super) fn restart(&self, particles: &Particles<D>) -> Result<KeptOf<D, S>> {
+        self.scene.diffusion_term().restart(&self.kept, particles, self.searches().0 + 1)
+    }
+
+    /// The neighbors of particles that were last searched at other places, as search number `searches`.
+    pub(super) fn resumed(
+        &self,
+        particles: &Particles<D>,
+        searched_at: &[[f64; D]],
+        searches: u64,
+    ) -> Result<KeptOf<D, S>> {
+        let mut before = particles.clone();
+        if <S::Diffusion as MovingDiffusion<D, S::Value>>::SPREADS {
+            before.set_points(searched_at)?;
+        }
+        let mut kept = self.scene.diffusion_term().restart(&self.kept, &before, searches)?;
+        self.scene.diffusion_term().follow(&mut kept, particles)?;
+        Ok(kept)
+    }
+
+    pub(super) fn points<'a>(&'a self, state: &'a MovingState<D, S::Value>) -> &'a [[f64; D]] {
+        if S::Advection::MOVES { &state.0 } else { self.site.points() }
+    }
+
+    pub(super) fn omega<'a>(&'a self, state: &'a MovingState<D, S::Value>) -> &'a [S::Value] {
+        if Self::EXCHANGES { &state.1.0 } else { &self.omega }
+    }
+
+    pub(super) fn volume<'a>(&'a self, state: &'a MovingState<D, S::Value>) -> &'a [f64] {
+        if S::Advection::SOLENOIDAL { &self.volume } else { &state.1.1 }
+    }
+
+    /// How often the neighbors were searched anew, and where the particles were then.
+    pub(super) fn searches(&self) -> (u64, &[[f64; D]]) {
+        self.scene.diffusion_term().searches(&self.kept)
+    }
+
+    pub(super) fn admits(&self, spacing: crate::scale::Spacing) -> Result<()> {
+        self.scene.diffusion_term().admits(&self.kept, spacing)
+    }
+
+    /// Brings the particles to the places and volumes of a state at time t.
+    pub(super) fn place(&mut self, t: f64, state: &MovingState<D, S::Value>) -> Result<()> {
+        if let Some((p, &volume)) = state.1.1.iter().enumerate().find(|(_, volume)| !(**volume > 0.0)) {
+            return Err(Error::from(SolverError::Volume { volume, t }).at(p));
+        }
+        if S::Advection::MOVES {
+            self.places.clear();
+            for (p, x) in state.0.iter().enumerate() {
+                self.places.push(self.domain.wrap(x).map_err(|error| error.at(p))?);
+            }
+            self.site.particles_mut().set_points(&self.places)?;
+        }
+        if !S::Advection::SOLENOIDAL {
+            let volumes = Volumes::each(state.1.1.clone())?;
+            self.site.particles_mut().set_volumes(volumes)?;
+        }
+        self.scene.advection_term().renew(&mut self.values, &self.site, &self.domain, t)?;
+        if S::Advection::MOVES {
+            self.scene.diffusion_term().follow(&mut self.kept, self.site.particles())?;
+        }
+        Ok(())
+    }
+
+    /// u_p = omega_p / V_p.
+    fn evaluate(&mut self, state: &MovingState<D, S::Value>) {
+        let mut u = std::mem::take(&mut self.u);
+        u.clear();
+        let of = |(&omega, &volume): (&S::Value, &f64)| S::Value::ZERO.plus(1.0 / volume, omega);
+        u.extend(self.omega(state).iter().zip(self.volume(state)).map(of));
+        self.u = u;
+    }
+
+    /// dx/dt = v, dV/dt = V div v, domega/dt = V div(D grad u) + V S.
+    pub(super) fn rate(
+        &mut self,
+        t: f64,
+        state: &MovingState<D, S::Value>,
+        rates: &mut MovingState<D, S::Value>,
+    ) -> Result<()> {
+        self.place(t, state)?;
+        if Self::EXCHANGES {
+            self.evaluate(state);
+        }
+        let (flow, values, points) = (self.scene.advection_term(), &self.values, self.site.points());
+        let (dx, (domega, dvolume)) = rates;
+        if S::Advection::MOVES {
+            each_row(dx, |p| flow.at(p, &points[p], t));
+        }
+        if !S::Advection::SOLENOIDAL {
+            each_row(dvolume, |p| state.1.1[p] * flow.divergence(values, p, &points[p], t));
+        }
+        if Self::EXCHANGES {
+            let (u, volume, source) = (&self.u, self.volume(state), self.scene.source_term());
+            let finish = |p: usize, rate: S::Value| {
+                let rate = source.rate(&(), p, &points[p], t, u, rate);
+                S::Value::ZERO.plus(volume[p], rate)
+            };
+            self.scene.diffusion_term().rates(&self.kept, &self.site, u, domega, finish)?;
+        }
+        Ok(())
+    }
+
+    /// What bounds a step from this state, and what the check of the diffusion rows found.
+    pub(super) fn limits(
+        &mut self,
+        t: f64,
+        state: &MovingState<D, S::Value>,
+        courant: f64,
+    ) -> Result<(Limits, Option<Report>)> {
+        self.place(t, state)?;
+        let mut limits = Limits::default();
+        let checked = self.scene.diffusion_term().check(&self.kept, &self.site)?;
+        if let Some((report, factor)) = &checked {
+            limits.add(Limit::Diffusion, Rate::decay(factor * report.spectral_bound));
+        }
+        let flow = self.scene.advection_term();
+        flow.bound(&self.values, &self.site, &self.domain, t, courant, &mut limits)?;
+        if checked.is_none() {
+            // Expansion adds to the decay of what diffuses (eq. 7.11); by themselves strengths and volumes bear any.
+            limits.set(Limit::Compression, Rate::default());
+        }
+        if <S::Source as SceneTerm<D, S::Value>>::PRESENT {
+            self.evaluate(state);
+            self.scene.source_term().limit(&mut (), &self.site, t, &self.u, &mut limits)?;
+        }
+        Ok((limits, checked.map(|(report, _)| report)))
+    }
+
+    /// The rightmost eigenvalue and the spectral radius of the diffusion rows of now.
+    pub(super) fn spectrum(&self) -> Result<Spectrum> {
+        self.scene.diffusion_term().spectrum(&self.kept, &self.site)
+    }
+
+    /// Whether V_p w_pq = V_q w_qp in the rows of now, found by applying them to two fields.
+    pub(super) fn symmetry(&self, state: &MovingState<D, S::Value>) -> Result<RowSymmetry> {
+        /// Rounding of a row and of the sum over all, in eps of the absolute terms; rows of DC-PSE miss it by percents.
+        const ROUNDING: f64 = 1e4;
+        let (points, mut random) = (self.site.points(), Random::new(1));
+        let mut field = || {
+            let mut one = || {
+                let mut u = S::Value::ZERO;
+                u.set(0, random.uniform() - 0.5);
+                u
+            };
+            points.iter().map(|_| one()).collect::<Vec<_>>()
+        };
+        let (a, b) = (field(), field());
+        let mut images = [a.clone(), b.clone()];
+        for (u, out) in [&a, &b].into_iter().zip(&mut images) {
+            self.scene.diffusion_term().rates(&self.kept, &self.site, u, out, |_, rate| rate)?;
+        }
+        let (mut defect, mut size) = (0.0, 0.0);
+        for (p, volume) in self.volume(state).iter().enumerate() {
+            let of = |u: &[S::Value], image: &[S::Value]| volume * u[p].get(0) * image[p].get(0);
+            let (ab, ba) = (of(&a, &images[1]), of(&b, &images[0]));
+            defect += ab - ba;
+            size += ab.abs() + ba.abs();
+        }
+        let symmetric = defect.abs() <= ROUNDING * S::Value::EPSILON * size;
+        Ok(if symmetric { RowSymmetry::Symmetric } else { RowSymmetry::General })
+    }
+}
+
+/// The points inside their domain.
+pub(super) fn wrapped<const D: usize>(points: &[[f64; D]], domain: &Domain<D>) -> Result<Vec<[f64; D]>> {
+    points.iter().enumerate().map(|(p, x)| domain.wrap(x).map_err(|error| error.at(p))).collect()
+}

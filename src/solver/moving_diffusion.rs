@@ -1,0 +1,372 @@
+//! div(D grad u) on particles that move: weights made anew wherever they are.
+
+use super::coefficient::{Diffusivity, diffusivities};
+use super::diffusion::{Diffusion, check_contrast};
+use super::fields::Fields;
+use super::policy::GrowthPolicy;
+use super::term::Site;
+use crate::apply::blocks::each_row;
+use crate::apply::{Apply, MatrixFree, MovingMethod, Report, Rows};
+use crate::domain::{Domain, Face};
+use crate::error::{ParticleError, Result};
+use crate::linear::{Spectrum, SpectrumEstimator};
+use crate::neighbors::{Neighbors, VerletList};
+use crate::operator::{DivGrad, Method};
+use crate::particles::Particles;
+use crate::scalar::Scalar;
+use crate::scale::{Cutoff, Spacing};
+use crate::stencil::{Neighbor, Stencil};
+
+/// The skin of the neighbor list over its reach, where the caller names none.
+const SKIN: f64 = 0.15;
+
+/// How the neighbors of moving particles are kept, and what is done about modes that grow.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct MovingSettings {
+    /// The cutoff of the rows; by default that of the method.
+    pub cutoff: Option<f64>,
+    /// The skin of the list; by default 0.15 of its reach, or less in a narrow domain.
+    pub skin: Option<f64>,
+    /// What is done about modes of the diffusion term that grow on the set of the start; later sets are not looked at.
+    pub growth: GrowthPolicy,
+}
+
+/// What the diffusion term of a scene is to particles that move. The unit type is no diffusion, and keeps no list.
+pub trait MovingDiffusion<const D: usize, E: Fields>: Sync {
+    /// The neighbor list and the method; of no size where there is no diffusion.
+    type Kept: Send;
+
+    /// Whether there is such a term.
+    const SPREADS: bool;
+
+    /// The order of the method.
+    fn order(&self) -> Option<u32>;
+
+    /// Whether rows of the method have condition numbers.
+    fn conditioned(&self) -> bool;
+
+    /// Refuses a diffusivity that is not there for so many particles.
+    ///
+    /// # Errors
+    /// As [`Diffusivity::validate`].
+    fn validate(&self, particles: usize) -> Result<()>;
+
+    /// Searches the neighbors of these particles.
+    ///
+    /// # Errors
+    /// As [`VerletList::build`] and [`MovingMethod::reach`]; [`ParticleError::Diffusivity`] for an illegal diffusivity.
+    fn start(&self, particles: &Particles<D>, domain: &Domain<D>, settings: MovingSettings) -> Result<Self::Kept>;
+
+    /// The same with the cutoffs of what is kept, for other particles, as search number `searches`.
+    ///
+    /// # Errors
+    /// As [`VerletList::build`].
+    fn restart(&self, kept: &Self::Kept, particles: &Particles<D>, searches: u64) -> Result<Self::Kept>;
+
+    /// Takes the places and volumes of now.
+    ///
+    /// # Errors
+    /// As [`VerletList::update`].
+    fn follow(&self, kept: &mut Self::Kept, particles: &Particles<D>) -> Result<()>;
+
+    /// Refuses a lattice on which the rows would be illegal.
+    ///
+    /// # Errors
+    /// As [`MovingMethod::admits`].
+    fn admits(&self, kept: &Self::Kept, spacing: Spacing) -> Result<()>;
+
+    /// Checks all rows of now; `None` where there are none. The eigenvalues of the term are bounded by the spectral bound
+    /// of the report times the number beside it.
+    ///
+    /// # Errors
+    /// Naming the particle whose row is illegal.
+    fn check(&self, kept: &Self::Kept, site: &Site<D>) -> Result<Option<(Report, f64)>>;
+
+    /// The rightmost eigenvalue and the spectral radius of the rows of now; zero without a product where no weight is
+    /// negative.
+    ///
+    /// # Errors
+    /// As [`Rows::assemble`] and [`SpectrumEstimator::estimate`].
+    fn spectrum(&self, kept: &Self::Kept, site: &Site<D>) -> Result<Spectrum>;
+
+    /// Writes `finish`(p, div(D grad u)_p) for every particle.
+    ///
+    /// # Errors
+    /// Naming the particle whose row is illegal.
+    fn rates(
+        &self,
+        kept: &Self::Kept,
+        site: &Site<D>,
+        u: &[E],
+        out: &mut [E],
+        finish: impl Fn(usize, E) -> E + Sync + Send,
+    ) -> Result<()>;
+
+    /// How often the neighbors were searched anew, and where the particles were then.
+    fn searches<'a>(&self, kept: &'a Self::Kept) -> (u64, &'a [[f64; D]]);
+}
+
+impl<const D: usize, E: Fields> MovingDiffusion<D, E> for () {
+    type Kept = ();
+    const SPREADS: bool = false;
+
+    fn order(&self) -> Option<u32> {
+        None
+    }
+
+    fn conditioned(&self) -> bool {
+        false
+    }
+
+    fn validate(&self, _: usize) -> Result<()> {
+        Ok(())
+    }
+
+    fn start(&self, _: &Particles<D>, _: &Domain<D>, _: MovingSettings) -> Result<()> {
+        Ok(())
+    }
+
+    fn restart(&self, (): &(), _: &Particles<D>, _: u64) -> Result<()> {
+        Ok(())
+    }
+
+    fn follow(&self, (): &mut (), _: &Particles<D>) -> Result<()> {
+        Ok(())
+    }
+
+    fn admits(&self, (): &(), _: Spacing) -> Result<()> {
+        Ok(())
+    }
+
+    fn check(&self, (): &(), _: &Site<D>) -> Result<Option<(Report, f64)>> {
+        Ok(None)
+    }
+
+    fn spectrum(&self, (): &(), _: &Site<D>) -> Result<Spectrum> {
+        Ok(Spectrum::default())
+    }
+
+    fn rates(
+        &self,
+        (): &(),
+        _: &Site<D>,
+        _: &[E],
+        out: &mut [E],
+        finish: impl Fn(usize, E) -> E + Sync + Send,
+    ) -> Result<()> {
+        each_row(out, |p| finish(p, E::ZERO));
+        Ok(())
+    }
+
+    fn searches<'a>(&self, (): &'a ()) -> (u64, &'a [[f64; D]]) {
+        (0, &[])
+    }
+}
+
+/// A method and the neighbors it works on, both where the particles are.
+#[derive(Clone, Debug)]
+pub struct MovingRows<const D: usize, M> {
+    method: M,
+    list: VerletList<D>,
+    domain: Domain<D>,
+    cutoff: f64,
+    /// Searches of the lists before this one, its own first search among them.
+    earlier: u64,
+}
+
+impl<const D: usize, M> MovingRows<D, M> {
+    fn within(&self) -> Within<'_, D> {
+        Within { list: &self.list, cutoff: self.cutoff }
+    }
+}
+
+impl<C: Diffusivity<D>, M: MovingMethod<D>, const D: usize, E: Fields> MovingDiffusion<D, E> for Diffusion<C, M> {
+    type Kept = MovingRows<D, M>;
+    const SPREADS: bool = true;
+
+    fn order(&self) -> Option<u32> {
+        Some(self.method.order())
+    }
+
+    fn conditioned(&self) -> bool {
+        self.method.conditioned()
+    }
+
+    fn validate(&self, particles: usize) -> Result<()> {
+        self.diffusivity.validate(particles)
+    }
+
+    fn start(
+        &self,
+        particles: &Particles<D>,
+        domain: &Domain<D>,
+        settings: MovingSettings,
+    ) -> Result<MovingRows<D, M>> {
+        if let Some(diffusivity) = self.diffusivity.constant()
+            && !(diffusivity >= 0.0 && diffusivity.is_finite())
+        {
+            return Err(ParticleError::Diffusivity { diffusivity }.into());
+        }
+        let [cutoff, reach] = match settings.cutoff {
+            Some(cutoff) => [cutoff; 2],
+            None => self.method.reach(particles, domain)?.map(|cutoff| cutoff.0),
+        };
+        // Skin and growth are room to move in, as far as images are counted rightly.
+        let widths = domain.widths();
+        let closed = domain.faces().map(|faces| faces.iter().all(|&face| face != Face::Open));
+        let narrowest = widths.iter().zip(closed).filter(|&(_, closed)| closed);
+        let room = narrowest.fold(f64::INFINITY, |room, (width, _)| room.min(0.499 * width));
+        let skin = settings.skin.unwrap_or((SKIN * reach).min(0.5 * (room - cutoff)).max(0.0));
+        let reach = reach.min(room - skin).max(cutoff);
+        let list = VerletList::build(particles, domain, Cutoff(reach), skin)?;
+        let mut method = self.method.clone();
+        method.set_volumes(particles.volumes()?);
+        Ok(MovingRows { method, list, domain: *domain, cutoff, earlier: 0 })
+    }
+
+    fn restart(&self, kept: &MovingRows<D, M>, particles: &Particles<D>, searches: u64) -> Result<MovingRows<D, M>> {
+        let list = VerletList::build(particles, &kept.domain, Cutoff(kept.list.reach()), kept.list.skin())?;
+        let mut method = kept.method.clone();
+        method.set_volumes(particles.volumes()?);
+        Ok(MovingRows { method, list, domain: kept.domain, cutoff: kept.cutoff, earlier: searches })
+    }
+
+    fn follow(&self, kept: &mut MovingRows<D, M>, particles: &Particles<D>) -> Result<()> {
+        kept.list.update(particles)?;
+        kept.method.set_volumes(particles.volumes()?);
+        Ok(())
+    }
+
+    fn admits(&self, kept: &MovingRows<D, M>, spacing: Spacing) -> Result<()> {
+        self.method.admits(spacing, Cutoff(kept.cutoff))
+    }
+
+    fn check(&self, kept: &MovingRows<D, M>, site: &Site<D>) -> Result<Option<(Report, f64)>> {
+        let within = kept.within();
+        let (report, factor) = match self.diffusivity.constant() {
+            Some(factor) => (*MatrixFree::new(&kept.method, &within)?.report(), factor),
+            None => {
+                let values = diffusivities(&self.diffusivity, site.points())?;
+                let method = DivGrad::new(kept.method.clone(), values)?.mean(self.mean);
+                (*MatrixFree::new(&method, &within)?.report(), 1.0)
+            }
+        };
+        check_contrast(&report)?;
+        Ok(Some((report, factor)))
+    }
+
+    fn spectrum(&self, kept: &MovingRows<D, M>, site: &Site<D>) -> Result<Spectrum> {
+        let within = kept.within();
+        match self.diffusivity.constant() {
+            Some(factor) => spectrum(&kept.method, &within, factor),
+            None => {
+                let values = diffusivities(&self.diffusivity, site.points())?;
+                spectrum(&DivGrad::new(kept.method.clone(), values)?.mean(self.mean), &within, 1.0)
+            }
+        }
+    }
+
+    fn rates(
+        &self,
+        kept: &MovingRows<D, M>,
+        site: &Site<D>,
+        u: &[E],
+        out: &mut [E],
+        finish: impl Fn(usize, E) -> E + Sync + Send,
+    ) -> Result<()> {
+        let within = kept.within();
+        match self.diffusivity.constant() {
+            Some(factor) => sweep(&kept.method, &within, factor, u, out, finish),
+            None => {
+                let values = diffusivities(&self.diffusivity, site.points())?;
+                let method = DivGrad::new(kept.method.clone(), values)?.mean(self.mean);
+                sweep(&method, &within, 1.0, u, out, finish)
+            }
+        }
+    }
+
+    fn searches<'a>(&self, kept: &'a MovingRows<D, M>) -> (u64, &'a [[f64; D]]) {
+        (kept.earlier + kept.list.rebuilds() as u64, kept.list.searched_at())
+    }
+}
+
+/// Products after which an estimate of the spectrum is taken as it is.
+const MOST: usize = 1000;
+
+/// The spectrum of the rows times a factor, from rows that are stored for it.
+fn spectrum<const D: usize, M: Method<D, Out = [f64; 1]>>(
+    method: &M,
+    neighbors: &Within<'_, D>,
+    factor: f64,
+) -> Result<Spectrum> {
+    let rows = Rows::<[f64; 1]>::assemble(method, neighbors)?;
+    if rows.report().negative_weights == 0 {
+        return Ok(Spectrum::default());
+    }
+    SpectrumEstimator::new().most(MOST).estimate(neighbors.targets(), |u, du| {
+        rows.apply(u, du)?;
+        du.iter_mut().for_each(|du| *du *= factor);
+        Ok(())
+    })
+}
+
+/// `finish`(p, factor sum_q w_pq (u_q - u_p)), row after row, without storing any.
+fn sweep<const D: usize, M: Method<D, Out = [f64; 1]>, E: Fields>(
+    method: &M,
+    neighbors: &Within<'_, D>,
+    factor: f64,
+    u: &[E],
+    out: &mut [E],
+    finish: impl Fn(usize, E) -> E + Sync + Send,
+) -> Result<()> {
+    let factor = E::Scalar::lift(factor);
+    MatrixFree::unchecked(method, neighbors).each(out, |p, draft| {
+        let (own, [diagonal]) = (u[p], draft.diagonal);
+        let mut sum = E::ZERO.plus_product(E::Scalar::lift(diagonal), own);
+        for (&q, &[w]) in draft.stencil.sources().iter().zip(&draft.weights) {
+            sum = sum.plus_difference(E::Scalar::lift(w), u[q as usize], own);
+        }
+        finish(p, E::ZERO.plus_product(factor, sum))
+    })
+}
+
+/// A list whose rows stay within a cutoff below its reach, so that rows that are refused can grow.
+struct Within<'a, const D: usize> {
+    list: &'a VerletList<D>,
+    cutoff: f64,
+}
+
+impl<const D: usize> Neighbors<D> for Within<'_, D> {
+    fn targets(&self) -> usize {
+        self.list.targets()
+    }
+
+    fn sources(&self) -> usize {
+        self.list.sources()
+    }
+
+    fn center(&self, p: usize) -> Option<usize> {
+        self.list.center(p)
+    }
+
+    fn cutoff(&self, _: usize) -> f64 {
+        self.cutoff
+    }
+
+    fn reach(&self) -> f64 {
+        self.list.reach()
+    }
+
+    fn generation(&self) -> u64 {
+        self.list.generation()
+    }
+
+    fn for_each(&self, p: usize, cutoff: f64, visit: impl FnMut(Neighbor<D>)) {
+        self.list.for_each(p, cutoff, visit);
+    }
+
+    fn gather(&self, p: usize, cutoff: f64, row: &mut Stencil<D>) {
+        self.list.gather(p, cutoff, row);
+    }
+}

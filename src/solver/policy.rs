@@ -1,0 +1,30 @@
+//! What happens to steps and modes beyond their limits.
+
+/// What a run does with a step above the limit of the moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum StepPolicy {
+    /// It is refused before anything changes.
+    #[default]
+    Refuse,
+    /// It is cut into substeps, each within the limit of its own moment; the ledger counts them.
+    Adapt {
+        /// The most substeps of one step; where more are needed the step is refused.
+        most: u32,
+    },
+    /// It is taken, and the ledger says so.
+    Allow,
+}
+
+/// What is done about modes that grow whatever the step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum GrowthPolicy {
+    /// The largest growth rate is estimated when the rows are made, and refused above 1e-8 of the spectral radius.
+    #[default]
+    Refuse,
+    /// It is estimated, and the ledger records it.
+    Allow,
+    /// Nothing is estimated, and the ledger records that.
+    Unknown,
+}

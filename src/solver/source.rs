@@ -1,0 +1,87 @@
+//! S(x, t, u).
+
+use super::fields::Fields;
+use super::limits::{Limits, Rate};
+use super::term::{SceneTerm, Site};
+use crate::apply::Report;
+use crate::error::{Limit, Result, SolverError, TimeError};
+use crate::neighbors::Neighbors;
+
+/// The source term S(x, t, u) of a scene, a function of the place, the time and all fields there.
+#[derive(Clone, Copy, Debug)]
+pub struct Source<F>(pub(super) F);
+
+impl<F> Source<F> {
+    /// The function.
+    pub fn function(&self) -> &F {
+        &self.0
+    }
+}
+
+impl<F: Fn(&[f64; D], f64, E) -> E + Sync, const D: usize, E: Fields> SceneTerm<D, E> for Source<F> {
+    type Rows = ();
+    const APPLIES: usize = 0;
+
+    fn build<P: Neighbors<D>>(&self, _: &Site<D>, _: &P) -> Result<()> {
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn rate(&self, (): &(), p: usize, x: &[f64; D], t: f64, u: &[E], rate: E) -> E {
+        rate.plus(1.0, self.0(x, t, u[p]))
+    }
+
+    fn limit(&self, (): &mut (), site: &Site<D>, t: f64, u: &[E], limits: &mut Limits) -> Result<()> {
+        let (mut fastest, scale) = (0.0_f64, difference(u));
+        for (p, x) in site.free() {
+            let Some(&u) = u.get(p) else { break };
+            fastest = fastest.max(decay(&self.0, x, t, u, scale).map_err(|error| error.at(p))?);
+        }
+        limits.add(Limit::Source, Rate::decay(fastest));
+        Ok(())
+    }
+
+    fn entries(&self, (): &(), _: usize, _: &[f64; D], _: f64, _: &mut dyn FnMut(usize, f64)) {}
+
+    fn report<'a>(&self, (): &'a ()) -> Option<&'a Report> {
+        None
+    }
+}
+
+/// How fast S makes fields decay at one particle, from difference quotients: -dS/du of one field; of several the largest
+/// row sum of |dS_i/du_j|, which bounds the modulus of all eigenvalues. Growth of a single field is physical and binds
+/// nothing.
+fn decay<const D: usize, E: Fields>(
+    source: &impl Fn(&[f64; D], f64, E) -> E,
+    x: &[f64; D],
+    t: f64,
+    u: E,
+    scale: f64,
+) -> Result<f64> {
+    let base = source(x, t, u);
+    if !base.finite() {
+        // What the first stage would find.
+        return Err(TimeError::NotFinite { stage: 1, t }.into());
+    }
+    let mut sums = 0.0_f64;
+    for i in 0..E::FIELDS {
+        let mut sum = 0.0;
+        for j in 0..E::FIELDS {
+            let mut moved = u;
+            moved.set(j, u.get(j) + scale);
+            let slope = (source(x, t, moved).get(i) - base.get(i)) / (moved.get(j) - u.get(j));
+            if !slope.is_finite() {
+                return Err(SolverError::Source { field: i, t }.into());
+            }
+            sum += if E::FIELDS == 1 { -slope } else { slope.abs() };
+        }
+        sums = sums.max(sum);
+    }
+    Ok(sums)
+}
+
+/// The change of u that a difference quotient is taken with: sqrt(eps) of the largest value, of 1 where all are zero.
+fn difference<E: Fields>(u: &[E]) -> f64 {
+    let largest = u.iter().fold(0.0_f64, |most, u| (0..E::FIELDS).fold(most, |most, i| most.max(u.get(i).abs())));
+    E::EPSILON.sqrt() * if largest > 0.0 { largest } else { 1.0 }
+}
