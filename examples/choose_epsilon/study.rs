@@ -151,8 +151,8 @@ impl<const D: usize> Scene<D> {
 }
 
 fn assemble<const D: usize>(
-    method: &(impl Method<D, Out = [f64; 1]> + Sync),
-    neighbors: &(impl Neighbors<D> + Sync),
+    method: &impl Method<D, Out = [f64; 1]>,
+    neighbors: &impl Neighbors<D>,
 ) -> parops::Result<(Rows, f64)> {
     let start = Instant::now();
     let mut rows = Rows::assemble(method, neighbors)?;
