@@ -1,0 +1,11 @@
+//! Rows at work: on fields, by threads, written out, refused.
+
+#[path = "../cases/mod.rs"]
+mod cases;
+
+mod export;
+mod faults;
+mod fields;
+mod full;
+mod threads;
+mod vtu;

@@ -1,0 +1,11 @@
+//! Sparse matrices, spectra, and the systems of boundary rows.
+
+#[path = "../cases/mod.rs"]
+mod cases;
+
+mod boundary;
+mod dense;
+mod hyperviscosity;
+mod matrices;
+mod spectrum;
+mod upwind_rows;

@@ -1,0 +1,200 @@
+//! Estimates of spectra against dense eigenvalues, known spectra and legal maps of every size.
+
+use crate::cases::cases;
+use crate::dense;
+use parops::{
+    Allowance, Along, Apply, CellList, CsrMatrix, DcPse, Domain, ErrorKind, Laplacian, LinearError, Nearest, Particles,
+    Pse, Result, Rows, Sign, Spectrum, SpectrumEstimator,
+};
+use proptest::prelude::*;
+
+const SIDE: usize = 16;
+
+/// The tolerance of the estimator is 1e-9 of the radius; eigenvalues of operators that are not normal are worse
+/// conditioned than their residuals.
+const CONVERGED: f64 = 1e-8;
+
+fn torus() -> Domain<2> {
+    Domain::periodic([0.0; 2], [1.0; 2]).unwrap()
+}
+
+fn sets() -> [(&'static str, Particles<2>); 3] {
+    let (lower, upper) = ([0.0; 2], [1.0; 2]);
+    [
+        ("lattice", Particles::lattice(lower, upper, [SIDE; 2]).unwrap()),
+        ("jitter", Particles::jittered(lower, upper, [SIDE; 2], 0.3, 1).unwrap()),
+        ("random", Particles::random(lower, upper, SIDE * SIDE, 1).unwrap()),
+    ]
+}
+
+fn advection(set: &Particles<2>, sign: Sign, k: usize) -> Result<Rows> {
+    DcPse::<_, 2>::of(Along([-0.8, 0.6])).sign(sign).assemble(&Nearest::build(set, &torus(), k)?)
+}
+
+fn diffusion(set: &Particles<2>) -> Result<Rows> {
+    let dcpse = DcPse::<Laplacian<2>, 2>::new();
+    dcpse.assemble(&Nearest::build(set, &torus(), dcpse.fewest_neighbors::<2>()?)?)
+}
+
+fn pse(set: &Particles<2>) -> Result<Rows> {
+    let pse = Pse::new(Laplacian::<2>, 2, set.spacing()?.epsilon(1.5)?, set.volumes()?)?.allow(Allowance::Everywhere);
+    let pse = pse.support(3.0)?;
+    pse.assemble(&CellList::build(set, &torus(), pse.cutoff())?)
+}
+
+fn estimate(rows: &Rows) -> Spectrum {
+    SpectrumEstimator::new().of(rows).unwrap()
+}
+
+#[test]
+fn estimates_agree_with_dense_eigenvalues_on_lattice_jittered_and_random_sets() {
+    for (name, set) in sets() {
+        let operators = [
+            ("pse", pse(&set)),
+            ("laplacian", diffusion(&set)),
+            ("advection", advection(&set, Sign::Minus, if name == "lattice" { 20 } else { 14 })),
+        ];
+        for (operator, rows) in operators {
+            let rows = rows.unwrap();
+            let (right, outer) = dense::extremes(&dense::matrix(rows.targets(), |u, du| rows.apply(u, du)));
+            let found = estimate(&rows);
+            assert!(found.converged && found.residual <= 1e-9 * found.radius, "{name} {operator} {found:?}");
+            assert!((found.abscissa - right).abs() <= CONVERGED * outer, "{name} {operator} {right} {found:?}");
+            // The radius is found to a residual of 1e-3.
+            assert!((found.radius / outer - 1.0).abs() <= 1e-3, "{name} {operator} {outer} {found:?}");
+            assert!(found.applies <= 3000, "{name} {operator} {found:?}");
+        }
+    }
+}
+
+#[test]
+fn slow_growth_amid_the_imaginary_axis_is_found_to_half_a_percent_of_the_radius() {
+    for seed in 1..=2 {
+        let set = Particles::jittered([0.0; 2], [1.0; 2], [SIDE; 2], 0.3, seed).unwrap();
+        let rows = advection(&set, Sign::Plus, 26).unwrap();
+        let (right, outer) = dense::extremes(&dense::matrix(rows.targets(), |u, du| rows.apply(u, du)));
+        let found = estimate(&rows);
+        assert!((found.abscissa - right).abs() <= 0.005 * outer, "{right} {outer} {found:?}");
+        assert!(right > 0.0 && found.abscissa > 1e-8 * found.radius, "{found:?}");
+    }
+}
+
+#[test]
+fn diffusion_grows_on_random_sets_and_on_no_jittered_one() {
+    for seed in 1..=3 {
+        let jittered = Particles::jittered([0.0; 2], [1.0; 2], [SIDE; 2], 0.3, seed).unwrap();
+        let random = Particles::random([0.0; 2], [1.0; 2], SIDE * SIDE, seed).unwrap();
+        let quiet = estimate(&diffusion(&jittered).unwrap());
+        let growing = estimate(&diffusion(&random).unwrap());
+        assert!(quiet.converged && quiet.relative_growth().abs() <= 1e-11, "{quiet:?}");
+        assert!(growing.converged && growing.relative_growth() > 1e-8, "{growing:?}");
+    }
+}
+
+#[test]
+fn closure_over_the_inner_particles_gives_the_dirichlet_spectrum() {
+    // u'' on 40 inner nodes of a line with zero ends: -4/h^2 sin^2(pi k h/2).
+    let n = 40;
+    let h = 1.0 / (n + 1) as f64;
+    let found = SpectrumEstimator::new()
+        .estimate(n, |u, du| {
+            for p in 0..n {
+                let left = if p > 0 { u[p - 1] } else { 0.0 };
+                let right = if p + 1 < n { u[p + 1] } else { 0.0 };
+                du[p] = (left - 2.0 * u[p] + right) / (h * h);
+            }
+            Ok(())
+        })
+        .unwrap();
+    let value = |k: f64| -4.0 / (h * h) * (std::f64::consts::PI * k * h / 2.0).sin().powi(2);
+    assert!((found.abscissa - value(1.0)).abs() <= CONVERGED * found.radius, "{found:?}");
+    assert!((found.radius / -value(n as f64) - 1.0).abs() <= 1e-3, "{found:?}");
+    assert_eq!(found.frequency, 0.0);
+}
+
+#[test]
+fn rectangular_rows_are_refused_by_their_numbers() {
+    let wide = CsrMatrix::from_triplets(2, 3, [(0, 2, 1.0)]).unwrap();
+    let refused = SpectrumEstimator::new().of(&wide).unwrap_err();
+    assert_eq!(*refused.kind(), ErrorKind::Linear(LinearError::NotSquare { rows: 2, columns: 3 }));
+}
+
+#[test]
+fn values_that_are_not_finite_are_named_and_settings_are_checked() {
+    let refused = SpectrumEstimator::new().estimate(5, |_, du| {
+        du[3] = f64::INFINITY;
+        Ok(())
+    });
+    let refused = refused.unwrap_err();
+    assert_eq!(refused.particle(), Some(3));
+    assert_eq!(*refused.kind(), ErrorKind::Linear(LinearError::Value { value: f64::INFINITY }));
+    for tolerance in [0.0, f64::NAN, 0.2] {
+        assert!(SpectrumEstimator::new().tolerance(tolerance).is_err(), "{tolerance}");
+    }
+}
+
+#[test]
+fn maps_of_no_entry_or_no_size_have_a_spectrum_of_zero() {
+    for n in [0, 1, 2, 7, 60] {
+        let found = SpectrumEstimator::new().estimate(n, |_, _| Ok(())).unwrap();
+        assert!(found.converged, "{n} {found:?}");
+        assert_eq!((found.abscissa, found.radius, found.relative_growth()), (0.0, 0.0, 0.0), "{n}");
+    }
+}
+
+#[test]
+fn estimates_are_repeated_bit_for_bit_and_scale_with_the_operator() {
+    let set = Particles::jittered([0.0; 2], [1.0; 2], [SIDE; 2], 0.3, 5).unwrap();
+    let rows = advection(&set, Sign::Minus, 14).unwrap();
+    let found = estimate(&rows);
+    assert_eq!(found, estimate(&rows));
+    for scale in [2.0_f64.powi(300), 2.0_f64.powi(-300)] {
+        let scaled = SpectrumEstimator::new().estimate(rows.targets(), |u, du| {
+            rows.apply(u, du)?;
+            du.iter_mut().for_each(|du| *du *= scale);
+            Ok(())
+        });
+        let scaled = scaled.unwrap();
+        assert!((scaled.abscissa / scale - found.abscissa).abs() <= CONVERGED * found.radius, "{scaled:?}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases().div_ceil(4), failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn known_spectra_are_found(
+        turning in prop::collection::vec((-1.0_f64..1.0, 0.1_f64..2.0), 0..4),
+        real in prop::collection::vec(-2.0_f64..1.0, 1..6),
+        mixing in prop::collection::vec(-0.3_f64..0.3, 400),
+    ) {
+        // Blocks [[a, b], [-b, a]] and numbers on the diagonal, turned by a product of plane rotations.
+        let n = 2 * turning.len() + real.len();
+        let mut entries = vec![vec![0.0; n]; n];
+        for (i, &(a, b)) in turning.iter().enumerate() {
+            (entries[2 * i][2 * i], entries[2 * i + 1][2 * i + 1]) = (a, a);
+            (entries[2 * i][2 * i + 1], entries[2 * i + 1][2 * i]) = (b, -b);
+        }
+        for (i, &a) in real.iter().enumerate() {
+            entries[2 * turning.len() + i][2 * turning.len() + i] = a;
+        }
+        let mut a = nalgebra::DMatrix::from_fn(n, n, |i, j| entries[i][j]);
+        let planes = (0..n).flat_map(|i| (0..i).map(move |j| (i, j)));
+        for ((i, j), angle) in planes.zip(&mixing) {
+            let mut turn = nalgebra::DMatrix::<f64>::identity(n, n);
+            (turn[(i, i)], turn[(j, j)]) = (angle.cos(), angle.cos());
+            (turn[(i, j)], turn[(j, i)]) = (angle.sin(), -angle.sin());
+            a = &turn * a * turn.transpose();
+        }
+        let found = SpectrumEstimator::new().estimate(n, |u, du| {
+            let product = &a * nalgebra::DVector::from_column_slice(u);
+            du.copy_from_slice(product.as_slice());
+            Ok(())
+        }).unwrap();
+        let right = turning.iter().map(|t| t.0).chain(real.iter().copied()).fold(f64::NEG_INFINITY, f64::max);
+        let outer = turning.iter().map(|t| t.0.hypot(t.1)).chain(real.iter().map(|x| x.abs())).fold(0.0, f64::max);
+        // A normal matrix; eigenvalues that nearly coincide are told apart only down to the breakdown of the subspace.
+        prop_assert!((found.abscissa - right).abs() <= 1e-7 * outer.max(1.0), "{right} {found:?}");
+        prop_assert!((found.radius - outer).abs() <= 1e-3 * outer, "{outer} {found:?}");
+    }
+}

@@ -1,0 +1,12 @@
+//! Domains, particle sets, and the providers of neighbors.
+
+#[path = "../cases/mod.rs"]
+mod cases;
+
+mod checker;
+mod domain;
+mod half_list;
+mod nearest;
+mod particles;
+mod providers_agree;
+mod verlet;

@@ -1,0 +1,99 @@
+//! The provider of nearest neighbors: a provider like any other, whole shells, whatever the spacing.
+
+use crate::cases::cases;
+use parops::testing::{check_provider, check_provider_against};
+use parops::{BruteForce, CellList, Cutoff, DcPse, Domain, Face, Laplacian, Nearest, Neighbors, Particles, Random};
+use proptest::prelude::*;
+
+/// Points whose spacing varies by 10^5, a pair at one place, and one point far away.
+fn graded(count: usize, seed: u64) -> Particles<2> {
+    let mut random = Random::new(seed);
+    let mut points: Vec<[f64; 2]> = (0..count - 2)
+        .map(|_| {
+            let size = 10.0_f64.powf(-5.0 * random.uniform());
+            [size * random.normal(), size * random.normal()]
+        })
+        .collect();
+    points.extend([points[0], [1e9, -3e8]]);
+    Particles::new(points).unwrap()
+}
+
+#[test]
+fn rows_are_those_of_the_oracle_on_even_graded_and_closed_sets() {
+    let even = Particles::jittered([0.0; 2], [1.0; 2], [12; 2], 0.3, 5).unwrap();
+    let faces = [[Face::MirrorOdd, Face::MirrorEven], [Face::Periodic; 2]];
+    let closed = Domain::new([0.0; 2], [1.0; 2], faces).unwrap();
+    for (particles, domain) in [(even.clone(), Domain::open()), (even, closed), (graded(120, 3), Domain::open())] {
+        let nearest = Nearest::build(&particles, &domain, 12).unwrap();
+        let oracle = BruteForce::build(&particles, &domain, Cutoff(nearest.reach())).unwrap();
+        assert_eq!(check_provider(&nearest), Ok(()));
+        assert_eq!(check_provider_against(&nearest, &oracle), Ok(()));
+        for p in 0..particles.len() {
+            let cutoff = nearest.cutoff(p);
+            assert!(nearest.count(p, cutoff) >= 12 && oracle.count(p, cutoff * (1.0 - 2e-9)) < 12);
+        }
+        // Room for three steps of 1.15, where the box has it.
+        let largest = (0..particles.len()).map(|p| nearest.cutoff(p)).fold(0.0, f64::max);
+        assert!(nearest.reach() >= 0.5_f64.min(1.15 * 1.15 * 1.15 * largest));
+    }
+}
+
+#[test]
+fn shells_of_a_lattice_are_whole() {
+    let lattice = Particles::lattice([0.0; 3], [1.0; 3], [9; 3]).unwrap();
+    let nearest = Nearest::build(&lattice, &Domain::open(), 7).unwrap();
+    // 6 at one spacing, 12 at sqrt(2).
+    let middle = 4 * 81 + 4 * 9 + 4;
+    assert_eq!(nearest.count(middle, nearest.cutoff(middle)), 18);
+    let ring = Particles::lattice([0.0], [1.0], [16]).unwrap();
+    let nearest = Nearest::build(&ring, &Domain::periodic([0.0], [1.0]).unwrap(), 3).unwrap();
+    assert!((0..16).all(|p| nearest.count(p, nearest.cutoff(p)) == 4));
+}
+
+#[test]
+fn targets_that_are_no_particles_have_no_center() {
+    let particles = graded(80, 9);
+    let targets = [[0.0, 0.0], [1e-4, 2e-4], [5e8, 0.0]];
+    let nearest = Nearest::build_at(&targets, &particles, &Domain::open(), 10).unwrap();
+    let oracle = BruteForce::build_at(&targets, &particles, &Domain::open(), Cutoff(nearest.reach())).unwrap();
+    assert_eq!(check_provider_against(&nearest, &oracle), Ok(()));
+    assert!((0..3).all(|p| nearest.center(p).is_none() && nearest.count(p, nearest.cutoff(p)) >= 10));
+}
+
+#[test]
+fn sets_with_fewer_neighbors_than_asked_for_are_served_with_all_there_are() {
+    let few = Particles::new(vec![[0.0, 0.0], [1.0, 0.5], [0.3, 2.0]]).unwrap();
+    let nearest = Nearest::build(&few, &Domain::open(), 18).unwrap();
+    assert!((0..3).all(|p| nearest.count(p, nearest.cutoff(p)) == 2));
+    assert!(DcPse::<Laplacian<2>, 2>::new().assemble(&nearest).is_err());
+    for points in [vec![], vec![[0.25, 0.5]], vec![[0.0; 2]; 5], vec![[0.25, 0.5]; 5]] {
+        let same = Particles::new(points).unwrap();
+        let nearest = Nearest::build(&same, &Domain::open(), 4).unwrap();
+        assert_eq!(nearest.targets(), same.len());
+        assert!((0..same.len()).all(|p| nearest.count(p, nearest.cutoff(p)) == same.len() - 1));
+    }
+    let torus = Domain::periodic([0.0; 2], [1.0; 2]).unwrap();
+    let nearest = Nearest::build(&Particles::lattice([0.0; 2], [1.0; 2], [4; 2]).unwrap(), &torus, 99).unwrap();
+    assert_eq!((nearest.cutoff(7), nearest.reach()), (0.5, 0.5));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn cutoff_is_the_distance_of_neighbor_number_k(seed: u64, count in 3..40_usize, k in 1..12_usize) {
+        let particles = graded(count, seed);
+        let nearest = Nearest::build(&particles, &Domain::open(), k).unwrap();
+        let cells = CellList::build(&particles, &Domain::open(), Cutoff(1e10)).unwrap();
+        for p in 0..count {
+            let mut distances = Vec::new();
+            cells.for_each(p, 1e10, |q| distances.push(q.separation[0].hypot(q.separation[1])));
+            distances.sort_by(f64::total_cmp);
+            if let Some(&last) = distances.get(k - 1) {
+                let cutoff = nearest.cutoff(p);
+                // A cutoff is widened by 1e-9 for rounding.
+                prop_assert!(cutoff >= last && cutoff <= last * (1.0 + 2e-9), "{cutoff:e} {last:e}");
+            }
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! PSE, SPH and one-sided operators, and what their rows owe to a change of the input.
+
+#[path = "../cases/mod.rs"]
+mod cases;
+
+mod anisotropic;
+mod checker;
+mod div_grad;
+mod expression;
+mod invariance;
+mod one_sided;
+mod order;
+mod pse;
+mod sph;
+mod sph_compact;
+mod stability;
