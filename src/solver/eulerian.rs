@@ -118,6 +118,15 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         self.t
     }
 
+    /// The longest legal step from here: infinite without a limit.
+    ///
+    /// # Errors
+    /// As [`limits`](Self::limits).
+    pub fn longest_step(&mut self, u: &[S::Value]) -> Result<f64> {
+        let limits = self.limits(u)?;
+        Ok(self.bound(&limits).0)
+    }
+
     /// The ledger after the last step.
     pub fn ledger(&self) -> &LedgerRow<D> {
         &self.ledger
