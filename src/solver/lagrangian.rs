@@ -16,7 +16,7 @@ use crate::kernel::MeshKernel;
 use crate::mesh::Remeshed;
 use crate::particles::Particles;
 use crate::scale::Volumes;
-use crate::time::{Entry, Plan, Stepper};
+use crate::time::{Entry, Plan, State, Stepper};
 
 /// The default constant C of the Lagrangian CFL condition dt |grad v|_2 <= C.
 pub const COURANT: f64 = 0.5;
@@ -288,7 +288,8 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
             return Err(SolverError::Limit { dt, limit, binding: binding.unwrap_or(Limit::Diffusion) }.into());
         }
         let mut work = std::mem::take(&mut self.work);
-        work.clone_from(&self.state);
+        // A clone of a pair would allocate.
+        work.assign(&self.state);
         let whole = within || self.policy == StepPolicy::Allow;
         let t = self.t;
         let done =
