@@ -11,6 +11,9 @@ use crate::linear::{Spectrum, SpectrumEstimator};
 /// by, if that is more.
 const LIMIT: f64 = 1e-8;
 
+/// How far from the abscissa estimates end that do not converge, over the radius; see [`SpectrumEstimator`].
+const RESOLUTION: f64 = 0.002;
+
 /// Products after which the estimate is taken as it is.
 const MOST: usize = 1000;
 
@@ -60,8 +63,9 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
     /// [`SolverError::Growing`].
     pub(super) fn check_growth(spectrum: &Spectrum) -> Result<f64> {
         let limit = legal::<S::Value>();
-        // What the residual leaves open is no proof of growth.
-        if spectrum.abscissa - spectrum.residual > limit * spectrum.radius {
+        // What the residual leaves open is no proof of growth, but estimates that did not converge are good to this too.
+        let open = spectrum.residual.min(RESOLUTION * spectrum.radius);
+        if spectrum.abscissa - open > limit * spectrum.radius {
             let (rate, radius) = (spectrum.abscissa, spectrum.radius);
             return Err(SolverError::Growing { rate, radius, limit }.into());
         }
