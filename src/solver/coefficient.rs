@@ -72,9 +72,9 @@ pub trait Velocity<const D: usize>: Sync {
     /// Whether it is known between the particles too; otherwise its gradient is that of the values at the particles.
     const EVERYWHERE: bool = true;
 
-    /// Whether it is the same at all times.
+    /// Whether it is the same at all times: what hangs on it is then computed once. Not by default.
     fn steady(&self) -> bool {
-        true
+        false
     }
 
     /// Checks that there is a vector for each of so many particles.
@@ -107,6 +107,10 @@ pub trait Velocity<const D: usize>: Sync {
 }
 
 impl<const D: usize> Velocity<D> for [f64; D] {
+    fn steady(&self) -> bool {
+        true
+    }
+
     #[inline(always)]
     fn at(&self, _: usize, _: &[f64; D], _: f64) -> [f64; D] {
         *self
@@ -119,6 +123,10 @@ impl<const D: usize> Velocity<D> for [f64; D] {
 
 impl<const D: usize> Velocity<D> for Vec<[f64; D]> {
     const EVERYWHERE: bool = false;
+
+    fn steady(&self) -> bool {
+        true
+    }
 
     fn validate(&self, particles: usize) -> Result<()> {
         one_each(self.len(), particles)
@@ -135,10 +143,6 @@ impl<const D: usize> Velocity<D> for Vec<[f64; D]> {
 }
 
 impl<F: Fn(&[f64; D], f64) -> [f64; D] + Sync, const D: usize> Velocity<D> for F {
-    fn steady(&self) -> bool {
-        false
-    }
-
     #[inline(always)]
     fn at(&self, _: usize, x: &[f64; D], t: f64) -> [f64; D] {
         self(x, t)
@@ -153,6 +157,10 @@ pub struct Steady<F>(
 );
 
 impl<F: Fn(&[f64; D]) -> [f64; D] + Sync, const D: usize> Velocity<D> for Steady<F> {
+    fn steady(&self) -> bool {
+        true
+    }
+
     #[inline(always)]
     fn at(&self, _: usize, x: &[f64; D], _: f64) -> [f64; D] {
         self.0(x)
