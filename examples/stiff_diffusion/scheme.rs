@@ -171,7 +171,7 @@ pub fn measure<M: Method<2, Out = [f64; 1]> + Clone>(
             }
             Err(error) => match *error.kind() {
                 ErrorKind::Solver(SolverError::Limit { limit, binding, .. }) => {
-                    record.refused = Some((limit, binding));
+                    (record.refused, record.seconds) = (Some((limit, binding)), f64::NAN);
                     return Ok(record);
                 }
                 _ => return Err(error),
