@@ -137,6 +137,11 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         &self.discrete
     }
 
+    /// What moves the scene in time.
+    pub fn stepper(&self) -> &St {
+        &self.stepper
+    }
+
     /// The run as it stands, with the field it has come to; the scene is not in it.
     pub fn save(&self, u: &[S::Value]) -> SavedRun<S::Value, St>
     where

@@ -11,7 +11,7 @@ use super::remeshing::{Nodes, Remesher, Remeshing, Trigger, check, overlap_is_lo
 use super::semi_discrete::SemiDiscrete;
 use crate::apply::Report;
 use crate::domain::Domain;
-use crate::error::{Limit, Result, SolverError, TimeError};
+use crate::error::{ErrorKind, Limit, LinearError, Result, SolverError, TimeError};
 use crate::kernel::MeshKernel;
 use crate::mesh::Remeshed;
 use crate::particles::Particles;
@@ -20,6 +20,11 @@ use crate::time::{Entry, Plan, State, Stepper};
 
 /// The default constant C of the Lagrangian CFL condition dt |grad v|_2 <= C.
 pub const COURANT: f64 = 0.5;
+
+/// Products of an estimate of growth on the set of the start, and on one that has moved since: there, modes that are not
+/// found in so few grow too slowly to matter before the set is another.
+const AT_THE_START: usize = 1000;
+const ON_THE_WAY: usize = 96;
 
 /// A scene on particles that move with the flow, advanced by any stepper:
 ///
@@ -58,6 +63,9 @@ pub struct Lagrangian<const D: usize, S: MovingScene<D>, St> {
     pub(super) stepper: St,
     policy: StepPolicy,
     courant: f64,
+    growth: GrowthPolicy,
+    /// The search of the neighbors after which growth was estimated last.
+    pub(super) surveyed: u64,
     sharp: Vec<(Limit, Rate)>,
     remesher: Option<Box<dyn Remesher<D, S::Value>>>,
     pub(super) ledger: LedgerRow<D>,
@@ -106,6 +114,8 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
             stepper,
             policy: StepPolicy::default(),
             courant: COURANT,
+            growth: settings.growth,
+            surveyed: 0,
             sharp: Vec::new(),
             remesher: None,
             ledger: LedgerRow::new(S::Value::FIELDS),
@@ -114,12 +124,8 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
             work,
             values: Vec::new(),
         };
-        if report.is_some() && settings.growth != GrowthPolicy::Unknown {
-            let spectrum = run.moving.spectrum()?;
-            run.ledger.growth = match settings.growth {
-                GrowthPolicy::Allow => spectrum.abscissa,
-                _ => SemiDiscrete::<D, S>::check_growth(&spectrum)?,
-            };
+        if report.is_some() {
+            (run.surveyed, run.ledger.growth) = (run.moving.searches().0, run.survey(AT_THE_START)?);
         }
         run.certify(report.as_ref());
         run.measure();
@@ -284,6 +290,15 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
         if !within && self.policy == StepPolicy::Refuse {
             return Err(SolverError::Limit { dt, limit, binding: binding.unwrap_or(Limit::Diffusion) }.into());
         }
+        let searches = self.moving.searches().0;
+        let growth = match report {
+            Some(_) if searches != self.surveyed => match self.survey(ON_THE_WAY) {
+                // A spectrum that is not found is no proof of growth.
+                Err(error) if matches!(error.kind(), ErrorKind::Linear(LinearError::NotConverged { .. })) => f64::NAN,
+                found => found?,
+            },
+            _ => self.ledger.growth,
+        };
         let mut work = std::mem::take(&mut self.work);
         // A clone of a pair would allocate.
         work.assign(&self.state);
@@ -300,12 +315,15 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
                 return Err(error);
             }
         };
+        self.surveyed = searches;
         match remeshed {
             None => self.work = std::mem::replace(&mut self.state, work),
             Some((fresh, kept)) => {
                 self.work = work;
                 let Remeshed { particles, strengths, dropped } = fresh;
                 self.state = self.moving.replace(particles, strengths, kept)?;
+                // What a mesh leaves is as regular as can be.
+                self.surveyed = self.moving.searches().0;
                 self.stepper.reset();
                 self.ledger.remeshings += 1;
                 for (i, totals) in self.ledger.fields.iter_mut().enumerate() {
@@ -318,11 +336,20 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
         self.certify(report.as_ref());
         self.measure();
         let ledger = &mut self.ledger;
-        (ledger.t, ledger.dt, ledger.limit, ledger.binding) = (end, dt, limit, binding);
+        (ledger.t, ledger.dt, ledger.limit, ledger.binding, ledger.growth) = (end, dt, limit, binding, growth);
         (ledger.within_limit, ledger.substeps) = (within || substeps > 1, substeps);
         ledger.step += 1;
         ledger.retries += u64::from(substeps) - 1;
         Ok(&self.ledger)
+    }
+
+    /// How fast modes of the diffusion term grow on the set of now, found in so many products at the most.
+    fn survey(&self, products: usize) -> Result<f64> {
+        match self.growth {
+            GrowthPolicy::Unknown => Ok(f64::NAN),
+            GrowthPolicy::Allow => Ok(self.moving.spectrum(products)?.abscissa),
+            GrowthPolicy::Refuse => SemiDiscrete::<D, S>::check_growth(&self.moving.spectrum(products)?),
+        }
     }
 
     /// What bounds a step of length dt from a state at time t, by default that of the run, and what the check of the rows
@@ -390,7 +417,7 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
             Trigger::Condition(limit) => match self.moving.limits(t, 0.0, work, self.courant) {
                 Ok((_, report)) => report.is_some_and(|report| report.condition > limit),
                 // Rows that are refused are worse than those that are not.
-                Err(error) if matches!(error.kind(), crate::error::ErrorKind::Operator(_)) => true,
+                Err(error) if matches!(error.kind(), ErrorKind::Operator(_)) => true,
                 Err(error) => return Err(error),
             },
         };

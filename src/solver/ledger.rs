@@ -121,7 +121,8 @@ pub struct LedgerRow<const D: usize> {
     pub substeps: u32,
     /// Substeps beyond the first, summed over the run.
     pub retries: u64,
-    /// The largest growth rate of a mode, in 1/time, estimated when the rows were made; NaN where nothing was estimated.
+    /// The largest growth rate of a mode, in 1/time, estimated when the rows were made, on moving particles when their
+    /// neighbors were searched last; NaN where nothing was estimated.
     pub growth: f64,
     /// Worst condition number of a moment system in use.
     pub condition: f64,

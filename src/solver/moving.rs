@@ -294,9 +294,9 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         Ok((limits, checked.map(|(report, _)| report)))
     }
 
-    /// The rightmost eigenvalue and the spectral radius of the diffusion rows of now.
-    pub(super) fn spectrum(&self) -> Result<Spectrum> {
-        self.scene.diffusion_term().spectrum(&self.kept, &self.site)
+    /// The rightmost eigenvalue and the spectral radius of the diffusion rows of now, in so many products each.
+    pub(super) fn spectrum(&self, products: usize) -> Result<Spectrum> {
+        self.scene.diffusion_term().spectrum(&self.kept, &self.site, products)
     }
 
     /// Whether V_p w_pq = V_q w_qp in the rows of now, found by applying them to two fields.
