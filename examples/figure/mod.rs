@@ -50,6 +50,9 @@ const PALETTE: [RGBColor; 8] = [
     RGBColor(130, 130, 130),
 ];
 
+/// Where a panel is drawn.
+pub type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+
 /// Draws panels side by side into one SVG file.
 pub fn draw(path: &Path, panels: &[(Axes, Vec<Curve>)]) -> Result<(), Box<dyn Error>> {
     let mut svg = String::new();
@@ -63,19 +66,29 @@ fn drawing<'a>(svg: &'a mut String, panels: &[(Axes, Vec<Curve>)]) -> Result<(),
     let root = SVGBackend::with_string(svg, (width, SIZE.1)).into_drawing_area();
     root.fill(&WHITE)?;
     for ((axes, curves), area) in panels.iter().zip(root.split_evenly((1, panels.len()))) {
-        let [x, y] = [bounds(curves, axes.logarithmic, |p| p.0), bounds(curves, axes.logarithmic, |p| p.1)];
-        if axes.logarithmic {
-            panel(&area, axes, curves, (x.0..x.1).log_scale(), (y.0..y.1).log_scale(), power_of_ten)?;
-        } else {
-            panel(&area, axes, curves, x.0..x.1, y.0..y.1, plain)?;
-        }
+        panel_of(&area, axes, curves)?;
     }
     root.present()?;
     Ok(())
 }
 
+/// Draws one panel into an area.
+pub fn panel_of<'a>(area: &Area<'a>, axes: &Axes, curves: &[Curve]) -> Result<(), Box<dyn Error + 'a>> {
+    let [x, y] = [bounds(curves, axes.logarithmic, |p| p.0), bounds(curves, axes.logarithmic, |p| p.1)];
+    if axes.logarithmic {
+        panel(area, axes, curves, (x.0..x.1).log_scale(), (y.0..y.1).log_scale(), power_of_ten)
+    } else {
+        panel(area, axes, curves, x.0..x.1, y.0..y.1, plain)
+    }
+}
+
+/// The color of this index.
+pub fn color(index: usize) -> RGBColor {
+    PALETTE[index % PALETTE.len()]
+}
+
 fn panel<'a, X, Y>(
-    area: &DrawingArea<SVGBackend<'a>, plotters::coord::Shift>,
+    area: &Area<'a>,
     axes: &Axes,
     curves: &[Curve],
     x: X,
@@ -105,7 +118,7 @@ where
         .axis_desc_style(("sans-serif", 17))
         .draw()?;
     for curve in curves {
-        let color = PALETTE[curve.color % PALETTE.len()];
+        let color = color(curve.color);
         let points = || curve.points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite());
         if curve.mark == Mark::Dashed {
             let dashes = DashedLineSeries::new(points(), 6, 5, color.stroke_width(1));
@@ -177,7 +190,8 @@ fn dense(points: &[(f64, f64)], logarithmic: bool) -> impl Iterator<Item = (f64,
         .filter(|p| p.0.is_finite() && p.1.is_finite())
 }
 
-fn legend<'a>(x: i32, y: i32, mark: Mark, color: RGBColor) -> DynElement<'static, SVGBackend<'a>, (i32, i32)> {
+/// What a curve looks like in a legend, at a place.
+pub fn legend<'a>(x: i32, y: i32, mark: Mark, color: RGBColor) -> DynElement<'static, SVGBackend<'a>, (i32, i32)> {
     let line = |width| PathElement::new(vec![(x, y), (x + 22, y)], color.stroke_width(width)).into_dyn();
     match mark {
         Mark::Circles | Mark::CirclesAlone => Circle::new((x + 11, y), 5, color.filled()).into_dyn(),

@@ -1,0 +1,55 @@
+//! What a scene works with.
+
+use parops::report::{Repeats, Sample, Stopwatch, Table, measure};
+
+use crate::counting;
+
+/// The table so far, and what the scenes claim about it.
+pub struct Bench {
+    pub quick: bool,
+    pub table: Table,
+    /// Claims: scene, whether it holds, and the sentence.
+    pub claims: Vec<(String, bool, String)>,
+}
+
+impl Bench {
+    pub fn new(quick: bool) -> Self {
+        Self { quick, table: Table::default(), claims: Vec::new() }
+    }
+
+    /// Runs a piece of work several times, adds the sample to the table and prints it.
+    ///
+    /// `work` times its phases by the stopwatch and fills in the errors and whatever else it knows.
+    pub fn sample(
+        &mut self,
+        what: Sample,
+        work: impl FnMut(&Stopwatch, &mut Sample) -> parops::Result<()>,
+    ) -> parops::Result<Sample> {
+        let repeats = if self.quick {
+            Repeats { least: 1, most: 25, seconds: 0.002 }
+        } else {
+            Repeats { least: 3, most: 25, seconds: 0.05 }
+        };
+        let sample = self.table.push(measure(what, repeats, Some(counting::peak), work)?)?.clone();
+        let order = sample.observed_order.map_or("-".to_string(), |order| format!("{order:.2}"));
+        println!(
+            "{:<26} {}D {:<12} {:<22} {:>7} {:>7.1} {:>10.3e} {order:>6} {:>10.3e} s {:>11} B",
+            sample.scene,
+            sample.dim,
+            sample.set,
+            sample.label(),
+            sample.n,
+            sample.neighbors,
+            sample.error_l2,
+            sample.seconds.total(),
+            sample.peak_bytes.unwrap_or(0)
+        );
+        Ok(sample)
+    }
+
+    /// States what the samples of a scene must show, next to its figure and in the output.
+    pub fn claim(&mut self, scene: &str, holds: bool, text: String) {
+        println!("{} {text}", if holds { "holds " } else { "FAILS " });
+        self.claims.push((scene.to_string(), holds, text));
+    }
+}

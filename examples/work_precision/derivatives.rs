@@ -1,0 +1,160 @@
+//! One evaluation of the Laplacian, the gradient and a mixed third derivative in 1D to 3D on four kinds of sets.
+//!
+//! SPH and PSE keep h/epsilon and are applied without stored weights, DC-PSE makes rows and applies them once, finite
+//! differences know where their neighbors are. Errors are relative, over all particles of the unit torus.
+
+use std::error::Error;
+
+use parops::report::{Phase, Sample, Stopwatch};
+use parops::{
+    Allowance, CellList, Cutoff, DcPse, Domain, Epsilon, Gaussian, MatrixFree, Method, Nearest, Particles, Pse, Sign,
+    Sph, SphForm,
+};
+
+use crate::bench::Bench;
+use crate::finite_difference::Differences;
+use crate::operators::{Terms, wave};
+use crate::sets::Set;
+
+/// epsilon over the spacing; less in 3D, so that a torus of 16 particles along an axis is two cutoffs wide.
+const OVERLAP: [f64; 3] = [2.0, 2.0, 1.6];
+/// Where kernels are cut, in units of epsilon: exp(-25) is 1e-11.
+const SUPPORT: f64 = 5.0;
+
+pub fn run(bench: &mut Bench) -> Result<(), Box<dyn Error>> {
+    for set in Set::ALL {
+        all::<1>(bench, set)?;
+        all::<2>(bench, set)?;
+        all::<3>(bench, set)?;
+    }
+    Ok(())
+}
+
+fn all<const D: usize>(bench: &mut Bench, set: Set) -> parops::Result<()> {
+    operator::<D, 1>(bench, set, "derivatives_laplacian", &Terms::laplacian())?;
+    operator::<D, D>(bench, set, "derivatives_gradient", &Terms::gradient())?;
+    operator::<D, 1>(bench, set, "derivatives_mixed_third", &Terms::mixed_third())
+}
+
+/// Particles along an axis.
+fn sides(quick: bool, dim: usize, method: &str, order: u32) -> &'static [usize] {
+    match (quick, dim, method, order) {
+        (true, 1, ..) => &[32, 64, 128],
+        (false, 1, ..) => &[32, 64, 128, 256, 512],
+        (true, 2, "PSE" | "SPH", _) => &[32],
+        (true, 2, ..) => &[24, 40],
+        (false, 2, ..) => &[28, 40, 56, 80],
+        (true, _, "DC-PSE", 6 | 8) => &[],
+        (true, ..) => &[16],
+        (false, _, "DC-PSE", 8) => &[16],
+        (false, _, "DC-PSE", 6) => &[16, 20],
+        (false, ..) => &[16, 20, 26],
+    }
+}
+
+/// Every method and order for one operator on one kind of set.
+fn operator<const D: usize, const K: usize>(
+    bench: &mut Bench,
+    set: Set,
+    scene: &str,
+    operator: &Terms<D, K>,
+) -> parops::Result<()> {
+    let quick = bench.quick;
+    let methods = [("SPH", 2)].into_iter().chain([2, 4, 6, 8].into_iter().flat_map(|r| [("PSE", r), ("DC-PSE", r)]));
+    let classical = [2, 4, 6, 8].map(|r| ("FD", r));
+    let methods = methods.chain(classical.into_iter().filter(|_| set == Set::Lattice));
+    for (method, order) in methods {
+        for &side in sides(quick, D, method, order) {
+            let (particles, spacings) = set.particles::<D>(side)?;
+            let points = particles.points();
+            let f: Vec<f64> = points.iter().map(wave).collect();
+            let exact: Vec<[f64; K]> = points.iter().map(|x| operator.exact(x)).collect();
+            let case = Case { operator, order, side, particles: &particles, spacings: &spacings, f: &f };
+            let what = Sample {
+                n: points.len(),
+                h: 1.0 / side as f64,
+                epsilon: matches!(method, "PSE" | "SPH").then(|| OVERLAP[D - 1] / side as f64),
+                ..Sample::new(scene, D, set.name(), method, order)
+            };
+            bench.sample(what, |watch, sample| {
+                let mut out = vec![[0.0; K]; f.len()];
+                sample.neighbors = match method {
+                    "SPH" => case.sph(watch, &mut out)?,
+                    "PSE" => case.pse(watch, &mut out)?,
+                    "DC-PSE" => case.dcpse(watch, &mut out)?,
+                    _ => case.classical(watch, &mut out)?,
+                };
+                sample.errors(out.iter().flatten().copied(), exact.iter().flatten().copied());
+                Ok(())
+            })?;
+        }
+    }
+    Ok(())
+}
+
+/// One method on one set.
+struct Case<'a, const D: usize, const K: usize> {
+    operator: &'a Terms<D, K>,
+    order: u32,
+    side: usize,
+    particles: &'a Particles<D>,
+    spacings: &'a [f64],
+    f: &'a [f64],
+}
+
+impl<const D: usize, const K: usize> Case<'_, D, K> {
+    fn sph(&self, watch: &Stopwatch, out: &mut [[f64; K]]) -> parops::Result<f64> {
+        let sph = watch.time(Phase::Build, || {
+            let sph =
+                Sph::new(self.operator.clone(), Gaussian::<D>::new(), self.epsilon()?, self.particles.volumes()?)?;
+            sph.form(SphForm::Difference)?.allow(Allowance::Everywhere).support(SUPPORT)
+        })?;
+        self.matrix_free(watch, &sph, sph.cutoff(), out)
+    }
+
+    fn pse(&self, watch: &Stopwatch, out: &mut [[f64; K]]) -> parops::Result<f64> {
+        let pse = watch.time(Phase::Build, || {
+            let pse = Pse::new(self.operator.clone(), self.order, self.epsilon()?, self.particles.volumes()?)?;
+            // Differences, since sums with f_p need moments that scattered sets do not have.
+            pse.sign(Sign::Minus)?.allow(Allowance::Everywhere).support(SUPPORT)
+        })?;
+        self.matrix_free(watch, &pse, pse.cutoff(), out)
+    }
+
+    fn dcpse(&self, watch: &Stopwatch, out: &mut [[f64; K]]) -> parops::Result<f64> {
+        let dcpse = DcPse::at_order(self.operator.clone(), self.order)?;
+        let needed = dcpse.fewest_neighbors::<D>()?;
+        let nearest = watch.time(Phase::Neighbors, || Nearest::build(self.particles, &torus()?, needed))?;
+        let rows = watch.time(Phase::Build, || dcpse.assemble(&nearest))?;
+        watch.time(Phase::Apply, || rows.apply_all(self.f, out))?;
+        Ok(rows.report().pairs as f64 / self.f.len() as f64)
+    }
+
+    fn classical(&self, watch: &Stopwatch, out: &mut [[f64; K]]) -> parops::Result<f64> {
+        let differences = watch.time(Phase::Build, || Differences::new(self.operator, self.order as usize, self.side));
+        watch.time(Phase::Apply, || differences.apply(self.f, out));
+        Ok(differences.nodes() as f64)
+    }
+
+    fn epsilon(&self) -> parops::Result<Epsilon> {
+        Epsilon::each(self.spacings.iter().map(|h| OVERLAP[D - 1] * h).collect())
+    }
+
+    /// Rows made, checked, made again and applied: cheaper than storing them where they serve once.
+    fn matrix_free<M: Method<D, Out = [f64; K]>>(
+        &self,
+        watch: &Stopwatch,
+        method: &M,
+        cutoff: Cutoff,
+        out: &mut [[f64; K]],
+    ) -> parops::Result<f64> {
+        let cells = watch.time(Phase::Neighbors, || CellList::build(self.particles, &torus()?, cutoff))?;
+        let operator = watch.time(Phase::Build, || MatrixFree::new(method, &cells))?;
+        watch.time(Phase::Apply, || operator.apply_all(self.f, out))?;
+        Ok(operator.report().pairs as f64 / self.f.len() as f64)
+    }
+}
+
+fn torus<const D: usize>() -> parops::Result<Domain<D>> {
+    Domain::periodic([0.0; D], [1.0; D])
+}
