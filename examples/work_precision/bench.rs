@@ -1,5 +1,7 @@
 //! What a scene works with.
 
+use std::path::PathBuf;
+
 use parops::report::{Repeats, Sample, Stopwatch, Table, measure};
 
 use crate::counting;
@@ -7,14 +9,16 @@ use crate::counting;
 /// The table so far, and what the scenes claim about it.
 pub struct Bench {
     pub quick: bool,
+    /// Where a scene may write files of its own.
+    pub out: PathBuf,
     pub table: Table,
     /// Claims: scene, whether it holds, and the sentence.
     pub claims: Vec<(String, bool, String)>,
 }
 
 impl Bench {
-    pub fn new(quick: bool) -> Self {
-        Self { quick, table: Table::default(), claims: Vec::new() }
+    pub fn new(quick: bool, out: PathBuf) -> Self {
+        Self { quick, out, table: Table::default(), claims: Vec::new() }
     }
 
     /// Runs a piece of work several times, adds the sample to the table and prints it.

@@ -8,6 +8,9 @@
 //! `cargo run --release --features faer --example work_precision [-- --quick] [-- --scene NAME] [-- --out DIR]`
 
 mod bench;
+#[allow(dead_code, reason = "the record is that of the example lecture_diffusion")]
+#[path = "../lecture_diffusion/benchmark.rs"]
+mod benchmark;
 mod bounds;
 mod choice;
 mod counting;
@@ -18,7 +21,11 @@ mod figure;
 mod finite_difference;
 #[path = "../figure/grid.rs"]
 mod grid;
+mod lecture;
 mod operators;
+mod overlap;
+#[path = "../lecture_diffusion/random_walk.rs"]
+mod random_walk;
 mod sets;
 
 use std::error::Error;
@@ -33,7 +40,8 @@ use parops::report::{Page, machine};
 
 type Scene = fn(&mut Bench) -> Result<(), Box<dyn Error>>;
 
-const SCENES: &[(&str, Scene)] = &[("derivatives", derivatives::run)];
+const SCENES: &[(&str, Scene)] =
+    &[("derivatives", derivatives::run), ("lecture", lecture::run), ("overlap", overlap::run)];
 
 fn main() -> ExitCode {
     match work_precision() {
@@ -53,7 +61,7 @@ fn work_precision() -> Result<bool, Box<dyn Error>> {
     #[cfg(feature = "rayon")]
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     fs::create_dir_all(&choice.out)?;
-    let mut bench = Bench::new(choice.quick);
+    let mut bench = Bench::new(choice.quick, choice.out.clone());
     for (name, scene) in SCENES {
         if choice.scene.as_ref().is_none_or(|only| only == name) {
             let start = Instant::now();
