@@ -5,7 +5,7 @@
 
 use std::error::Error;
 
-use parops::report::{Phase, Sample, Stopwatch};
+use parops::report::{Phase, Sample, Stopwatch, observed_order};
 use parops::{
     Allowance, CellList, Cutoff, DcPse, Domain, Epsilon, Gaussian, MatrixFree, Method, Nearest, Particles, Pse, Sign,
     Sph, SphForm,
@@ -32,41 +32,41 @@ pub fn run(bench: &mut Bench) -> Result<(), Box<dyn Error>> {
 }
 
 /// Differences and DC-PSE must show their orders in one dimension, where the grids are fine enough, above rounding; PSE of
-/// fixed overlap must not on scattered sets, as its documentation says.
+/// fixed overlap must not on scattered sets, as its documentation says: its error is that of the sums from order 4 on.
 fn claims(bench: &mut Bench) {
     let mut found = Vec::new();
     for task in bench.table.tasks().iter().filter(|task| task.samples()[0].dim == 1) {
         let [mut low, mut high, mut pse] = [f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
         for series in task.series() {
-            // The last sample above rounding, in which a derivative of degree 3 gains eps / h^3.
-            let Some(sample) = series.iter().rev().find(|s| s.error_l2 > 1e-8) else { continue };
-            let Some(order) = sample.observed_order else { continue };
-            match sample.method.as_str() {
-                "FD" | "DC-PSE" => {
-                    let excess = order - f64::from(sample.order);
+            let (first, last) = (series[0], series[series.len() - 1]);
+            match (first.method.as_str(), first.order) {
+                ("FD" | "DC-PSE", order) => {
+                    let above = series.iter().rev().find(|sample| sample.error_l2 > ROUNDING);
+                    let excess =
+                        above.and_then(|s| s.observed_order).map_or(f64::NAN, |found| found - f64::from(order));
                     (low, high) = (low.min(excess), high.max(excess));
                 }
-                "PSE" => pse = pse.max(order),
+                ("PSE", 4..) => {
+                    let whole = observed_order([first.h, last.h], [first.error_l2, last.error_l2]);
+                    pse = pse.max(whole.unwrap_or(f64::INFINITY));
+                }
                 _ => {}
             }
         }
         let Sample { scene, set, .. } = task.samples()[0];
-        let (holds, worst) = (low > -0.6 && high < 1.1, format!("between r {low:+.2} and r {high:+.2}"));
-        found.push((scene.clone(), holds, format!("1D, {set}: observed orders of DC-PSE and differences are {worst}")));
-        if set != "lattice" {
-            let text =
-                format!("1D, {set}: PSE of fixed overlap has observed orders up to {pse:.2}, it does not converge");
-            found.push((scene.clone(), pse < 0.5, text));
+        let text =
+            format!("1D, {set}: observed orders of DC-PSE and differences are between r {low:+.2} and r {high:+.2}");
+        found.push((scene.clone(), low > -0.6 && high < 0.6, text));
+        if set != Set::Lattice.name() {
+            let text = format!("1D, {set}: PSE 4 to 8 of fixed overlap have observed orders up to {pse:.2}");
+            found.push((scene.clone(), pse < 1.0, text));
         }
     }
     found.into_iter().for_each(|(scene, holds, text)| bench.claim(&scene, holds, text));
 }
 
-fn all<const D: usize>(bench: &mut Bench, set: Set) -> parops::Result<()> {
-    operator::<D, 1>(bench, set, "derivatives_laplacian", &Terms::laplacian())?;
-    operator::<D, D>(bench, set, "derivatives_gradient", &Terms::gradient())?;
-    operator::<D, 1>(bench, set, "derivatives_mixed_third", &Terms::mixed_third())
-}
+/// Errors below this are not asked for their order: a third derivative multiplies rounding by h^-3.
+const ROUNDING: f64 = 1e-9;
 
 /// Particles along an axis.
 ///
@@ -75,7 +75,7 @@ fn all<const D: usize>(bench: &mut Bench, set: Set) -> parops::Result<()> {
 fn sides(quick: bool, set: Set, dim: usize, method: &str, order: u32) -> &'static [usize] {
     let thin = set == Set::Clustered && (method != "DC-PSE" || order > 4);
     match (quick, dim, method) {
-        (true, 1, _) => &[32, 64, 128],
+        (true, 1, _) => &[64, 128, 256],
         (false, 1, _) => &[32, 64, 128, 256, 512],
         (true, 2, "PSE" | "SPH") => &[32],
         (true, 2, _) => &[24, 40],

@@ -16,6 +16,7 @@ mod choice;
 mod counting;
 mod curves;
 mod derivatives;
+#[allow(dead_code, reason = "panels are drawn by the grid")]
 #[path = "../figure/mod.rs"]
 mod figure;
 mod finite_difference;

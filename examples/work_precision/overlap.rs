@@ -126,7 +126,7 @@ fn second() -> Vec<Term<1>> {
 fn symbol(order: u32, epsilon: f64) -> parops::Result<f64> {
     const NODES: i32 = 16;
     let kernel = Exchange::<1>::new(&second(), order)?;
-    let reach = (kernel.support() * f64::from(NODES)).ceil() as i32;
+    let reach = (Kernel::<f64, 1>::support(&kernel) * f64::from(NODES)).ceil() as i32;
     let sum: f64 = (1..=reach)
         .map(|i| f64::from(i) / f64::from(NODES))
         // cos a - 1 without cancellation.
