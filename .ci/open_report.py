@@ -22,7 +22,7 @@ addEventListener("load", () => {
     const frame = svg ? svg.getBoundingClientRect() : {width: 0, height: 0};
     const extent = svg ? svg.getBBox() : {width: 0, height: 0};
     // A mark is a small filled shape: backgrounds, frames and axes are not.
-    const marks = svg ? [...svg.querySelectorAll("circle, polygon, line")].filter(shape => {
+    const marks = svg ? [...svg.querySelectorAll("circle, polygon, rect, line")].filter(shape => {
       const box = shape.getBoundingClientRect();
       return box.width > 0 && box.height > 0 && box.width < 40 && box.height < 40
         && box.left >= frame.left && box.right <= frame.right
@@ -96,7 +96,7 @@ def main():
     spoiled = {
         "a figure left out": re.sub(r"<figure.*?</figure>", "", page, count=1, flags=re.DOTALL),
         "an empty drawing": re.sub(r"(<figure[^>]*>\s*<svg[^>]*>).*?(</svg>)", r"\1\2", page, count=1, flags=re.DOTALL),
-        "a drawing without marks": re.sub(r"<(circle|polygon|line) [^>]*/>", "", page),
+        "a drawing without marks": re.sub(r"<(circle|polygon|rect|line) [^>]*/>", "", page),
         "a drawing out of sight": page.replace("figure svg{", "figure svg{display:none;"),
     }
     for name, text in spoiled.items():

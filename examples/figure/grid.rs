@@ -8,6 +8,8 @@ use plotters::prelude::*;
 use crate::figure::{Axes, Curve, legend, panel_of};
 
 const PANEL: (u32, u32) = (440, 370);
+/// Axes this long have labels at powers of ten alone, which do not touch.
+const SPAN: f64 = 300.0;
 /// Width and height of an entry of the legend.
 const ENTRY: (u32, u32) = (220, 24);
 
@@ -41,7 +43,7 @@ fn drawing<'a>(
     root.fill(&WHITE)?;
     let (upper, lower) = root.split_vertically(PANEL.1 * rows as u32);
     for ((axes, curves), area) in panels.iter().zip(upper.split_evenly((rows, columns))) {
-        panel_of(&area, axes, curves)?;
+        panel_of(&area, axes, curves, SPAN)?;
     }
     for (i, (name, mark, color)) in entries.into_iter().enumerate() {
         let (x, y) = ((i % across) as i32 * ENTRY.0 as i32 + 24, (i / across) as i32 * ENTRY.1 as i32 + 14);

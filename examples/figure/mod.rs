@@ -28,6 +28,7 @@ pub enum Mark {
     Triangles,
     Crosses,
     CirclesAlone,
+    Squares,
 }
 
 /// Titles and kind of axes of one panel.
@@ -66,16 +67,20 @@ fn drawing<'a>(svg: &'a mut String, panels: &[(Axes, Vec<Curve>)]) -> Result<(),
     let root = SVGBackend::with_string(svg, (width, SIZE.1)).into_drawing_area();
     root.fill(&WHITE)?;
     for ((axes, curves), area) in panels.iter().zip(root.split_evenly((1, panels.len()))) {
-        panel_of(&area, axes, curves)?;
+        panel_of(&area, axes, curves, 1.0)?;
     }
     root.present()?;
     Ok(())
 }
 
-/// Draws one panel into an area.
-pub fn panel_of<'a>(area: &Area<'a>, axes: &Axes, curves: &[Curve]) -> Result<(), Box<dyn Error + 'a>> {
+/// Draws one panel into an area; the ends of a logarithmic axis are at least the factor `span` apart.
+pub fn panel_of<'a>(area: &Area<'a>, axes: &Axes, curves: &[Curve], span: f64) -> Result<(), Box<dyn Error + 'a>> {
     let [x, y] = [bounds(curves, axes.logarithmic, |p| p.0), bounds(curves, axes.logarithmic, |p| p.1)];
     if axes.logarithmic {
+        let [x, y] = [x, y].map(|(low, high)| {
+            let more = (span * low / high).max(1.0).sqrt();
+            (low / more, high * more)
+        });
         panel(area, axes, curves, (x.0..x.1).log_scale(), (y.0..y.1).log_scale(), power_of_ten)
     } else {
         panel(area, axes, curves, x.0..x.1, y.0..y.1, plain)
@@ -136,7 +141,10 @@ where
             Mark::Crosses => {
                 chart.draw_series(points().map(|p| Cross::new(p, 5, color.stroke_width(2))))?;
             }
-            Mark::Line | Mark::Dashed => {}
+            Mark::Line | Mark::Dashed | Mark::Squares => {}
+        }
+        if curve.mark == Mark::Squares {
+            chart.draw_series(points().map(|p| EmptyElement::at(p) + square((0, 0), 4, color)))?;
         }
         if !curve.name.is_empty() {
             let mark = curve.mark;
@@ -196,10 +204,16 @@ pub fn legend<'a>(x: i32, y: i32, mark: Mark, color: RGBColor) -> DynElement<'st
     match mark {
         Mark::Circles | Mark::CirclesAlone => Circle::new((x + 11, y), 5, color.filled()).into_dyn(),
         Mark::Triangles => TriangleMarker::new((x + 11, y), 7, color.filled()).into_dyn(),
+        Mark::Squares => square((x + 11, y), 5, color).into_dyn(),
         Mark::Crosses => Cross::new((x + 11, y), 6, color.stroke_width(2)).into_dyn(),
         Mark::Line => line(2),
         Mark::Dashed => DashedPathElement::new([(x, y), (x + 22, y)], 6, 3, color.stroke_width(1)).into_dyn(),
     }
+}
+
+/// A square of twice this side.
+fn square((x, y): (i32, i32), half: i32, color: RGBColor) -> Rectangle<(i32, i32)> {
+    Rectangle::new([(x - half, y - half), (x + half, y + half)], color.filled())
 }
 
 /// The range of all points with a margin, in the measure of the axis.

@@ -86,7 +86,7 @@ fn own_method(options: &Options) -> std::result::Result<bool, Box<dyn Error>> {
     let torus = Domain::periodic([0.0; 2], [1.0; 2])?;
     for side in if options.quick { vec![24, 48] } else { vec![24, 48, 96, 192] } {
         let h = 1.0 / side as f64;
-        let particles = Particles::jittered([0.0; 2], [1.0; 2], [side; 2], 0.1, 1)?;
+        let particles = Particles::jittered([0.0; 2], [1.0; 2], [side; 2], 0.3, 1)?;
         let f: Vec<f64> = particles.points().iter().map(|x| (TAU * (x[0] - 2.0 * x[1])).sin()).collect();
         for (name, order) in [("Brookshaw", 2), ("PSE", 2), ("DC-PSE", 2), ("DC-PSE", 4)] {
             let what = Sample { n: f.len(), h, ..Sample::new("own_method", 2, "jittered", name, order) };
@@ -113,7 +113,9 @@ fn own_method(options: &Options) -> std::result::Result<bool, Box<dyn Error>> {
     let figure = options.out.join("own_method.svg");
     curves::draw(&figure, &table, "own_method")?;
     let mut page = Page::new("A method of your own", &table);
-    machine().iter().for_each(|(name, value)| drop(page.fact(name, value)));
+    for (name, value) in machine() {
+        page.fact(name, &value);
+    }
     page.figure("own_method", &read_to_string(figure)?)?
         .write(&mut File::create(options.out.join("own_method.html"))?)?;
 

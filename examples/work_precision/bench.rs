@@ -12,13 +12,15 @@ pub struct Bench {
     /// Where a scene may write files of its own.
     pub out: PathBuf,
     pub table: Table,
+    /// Figures of a scene besides its own: scene and file.
+    pub figures: Vec<(String, PathBuf)>,
     /// Claims: scene, whether it holds, and the sentence.
     pub claims: Vec<(String, bool, String)>,
 }
 
 impl Bench {
     pub fn new(quick: bool, out: PathBuf) -> Self {
-        Self { quick, out, table: Table::default(), claims: Vec::new() }
+        Self { quick, out, table: Table::default(), figures: Vec::new(), claims: Vec::new() }
     }
 
     /// Runs a piece of work several times, adds the sample to the table and prints it.
@@ -30,7 +32,7 @@ impl Bench {
         work: impl FnMut(&Stopwatch, &mut Sample) -> parops::Result<()>,
     ) -> parops::Result<Sample> {
         let repeats = if self.quick {
-            Repeats { least: 1, most: 25, seconds: 0.002 }
+            Repeats { least: 1, most: 7, seconds: 0.01 }
         } else {
             Repeats { least: 3, most: 25, seconds: 0.05 }
         };

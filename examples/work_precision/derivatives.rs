@@ -68,6 +68,12 @@ fn claims(bench: &mut Bench) {
 /// Errors below this are not asked for their order: a third derivative multiplies rounding by h^-3.
 const ROUNDING: f64 = 1e-9;
 
+fn all<const D: usize>(bench: &mut Bench, set: Set) -> parops::Result<()> {
+    operator::<D, 1>(bench, set, "derivatives_laplacian", &Terms::laplacian())?;
+    operator::<D, D>(bench, set, "derivatives_gradient", &Terms::gradient())?;
+    operator::<D, 1>(bench, set, "derivatives_mixed_third", &Terms::mixed_third())
+}
+
 /// Particles along an axis.
 ///
 /// In 3D kernels and the stencils of high orders reach across the half torus where it has fewer than 12 particles along an

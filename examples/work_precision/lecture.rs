@@ -40,7 +40,6 @@ pub fn run(bench: &mut Bench) -> Result<(), Box<dyn Error>> {
 /// Bins of particles that walk, by one seed.
 fn random_walk(bench: &mut Bench, n: usize) -> parops::Result<()> {
     let what = Sample {
-        stepper: "walk".to_string(),
         n,
         h: X_RW / n as f64,
         dt: Some(DT),

@@ -97,6 +97,9 @@ fn write(choice: &Choice, bench: &Bench) -> Result<(), Box<dyn Error>> {
         curves::draw(&path, &bench.table, scene)?;
         page.figure(scene, &fs::read_to_string(path)?)?;
     }
+    for (scene, path) in &bench.figures {
+        page.figure(scene, &fs::read_to_string(path)?)?;
+    }
     for (scene, holds, text) in &bench.claims {
         page.note(scene, &format!("{}: {text}", if *holds { "holds" } else { "FAILS" }));
     }

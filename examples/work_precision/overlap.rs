@@ -12,9 +12,12 @@ use std::fmt::Write;
 use parops::report::{Phase, Sample};
 use parops::{
     Allowance, Apply, CellList, Domain, Epsilon, Exchange, Kernel, MatrixFree, MultiIndex, Particles, Pse, Term,
+    Volumes,
 };
 
 use crate::bench::Bench;
+use crate::figure::{Axes, Curve, Mark};
+use crate::grid;
 
 const SCENE: &str = "overlap";
 /// The wave sin(2 pi x + phase).
@@ -26,6 +29,11 @@ const KEPT: f64 = 1.0;
 const POWER: f64 = 0.5;
 const COARSEST: f64 = 1.0 / 32.0;
 const JITTER: f64 = 0.3;
+/// Of the figure of both parts.
+const TITLES: [[&str; 2]; 2] = [
+    ["lattice, h/epsilon kept", "lattice, h/epsilon falling"],
+    ["jittered, h/epsilon kept", "jittered, h/epsilon falling"],
+];
 
 /// The two parts of a relative error in L2.
 struct Parts {
@@ -36,6 +44,7 @@ struct Parts {
 pub fn run(bench: &mut Bench) -> Result<(), Box<dyn Error>> {
     let sides: &[usize] =
         if bench.quick { &[32, 128, 512, 2048] } else { &[32, 64, 128, 256, 512, 1024, 2048, 4096, 8192] };
+    let mut panels: Vec<(Axes, Vec<Curve>)> = Vec::new();
     let mut csv = "set,order,overlap,n,h,epsilon,error_l2,mollification_l2,quadrature_l2\n".to_string();
     for (set, jitter) in [("lattice", 0.0), ("jittered", JITTER)] {
         for order in [2, 4] {
@@ -51,7 +60,7 @@ pub fn run(bench: &mut Bench) -> Result<(), Box<dyn Error>> {
                     let sample = bench.sample(what, |watch, sample| {
                         let pse = watch.time(Phase::Build, || {
                             let kernel = Exchange::<1>::new(&second(), order)?;
-                            let volumes = parops::Volumes::equal(h)?;
+                            let volumes = Volumes::equal(h)?;
                             let pse = Pse::with_kernels([kernel], Epsilon::global(epsilon)?, &volumes)?;
                             parops::Result::Ok(pse.allow(Allowance::Everywhere))
                         })?;
@@ -85,11 +94,36 @@ pub fn run(bench: &mut Bench) -> Result<(), Box<dyn Error>> {
                     parts.push(part);
                 }
                 claim(bench, set, order, falling, &errors, &parts);
+                let title = TITLES[usize::from(jitter > 0.0)][usize::from(falling)];
+                match panels.iter_mut().find(|(axes, _)| axes.title == title) {
+                    Some((_, all)) => all.extend(curves(order, sides, &parts)),
+                    None => {
+                        let axes = Axes { title, x: "spacing h", y: "part of the L2 error", logarithmic: true };
+                        panels.push((axes, curves(order, sides, &parts).into()));
+                    }
+                }
             }
         }
     }
     std::fs::write(bench.out.join("overlap_parts.csv"), csv)?;
+    let file = bench.out.join("overlap_parts.svg");
+    grid::draw(&file, panels.len(), panels)?;
+    bench.figures.push((SCENE.to_string(), file));
     Ok(())
+}
+
+/// Both parts against the spacing, a panel a set and choice of overlap.
+fn curves(order: u32, sides: &[usize], parts: &[Parts]) -> [Curve; 2] {
+    let curve = |name: &str, mark, part: fn(&Parts) -> f64| Curve {
+        name: format!("{name}, order {order}"),
+        points: sides.iter().zip(parts).map(|(&side, parts)| (1.0 / side as f64, part(parts))).collect(),
+        mark,
+        color: order as usize / 2 - 1,
+    };
+    [
+        curve("mollification", Mark::Circles, |parts| parts.mollification),
+        curve("quadrature", Mark::Squares, |parts| parts.quadrature),
+    ]
 }
 
 /// What the two parts must do.
