@@ -54,9 +54,8 @@ fn claims(bench: &mut Bench) {
             }
         }
         let Sample { scene, set, .. } = task.samples()[0];
-        let text =
-            format!("1D, {set}: observed orders of DC-PSE and differences are between r {low:+.2} and r {high:+.2}");
-        found.push((scene.clone(), low > -0.6 && high < 0.6, text));
+        let text = format!("1D, {set}: observed orders of DC-PSE and differences are {low:.2} to {high:.2} times r");
+        found.push((scene.clone(), low > 0.85 && high < 1.1, text));
         if set != Set::Lattice.name() {
             let text = format!("1D, {set}: PSE 4 to 8 of fixed overlap have observed orders up to {pse:.2}");
             found.push((scene.clone(), pse < 1.0, text));
