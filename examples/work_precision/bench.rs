@@ -9,6 +9,8 @@ use crate::counting;
 /// The table so far, and what the scenes claim about it.
 pub struct Bench {
     pub quick: bool,
+    /// Whether every piece of work is run once, for its errors alone.
+    once: bool,
     /// Where a scene may write files of its own.
     pub out: PathBuf,
     pub table: Table,
@@ -19,8 +21,8 @@ pub struct Bench {
 }
 
 impl Bench {
-    pub fn new(quick: bool, out: PathBuf) -> Self {
-        Self { quick, out, table: Table::default(), figures: Vec::new(), claims: Vec::new() }
+    pub fn new(quick: bool, once: bool, out: PathBuf) -> Self {
+        Self { quick, once, out, table: Table::default(), figures: Vec::new(), claims: Vec::new() }
     }
 
     /// Runs a piece of work several times, adds the sample to the table and prints it.
@@ -31,10 +33,11 @@ impl Bench {
         what: Sample,
         work: impl FnMut(&Stopwatch, &mut Sample) -> parops::Result<()>,
     ) -> parops::Result<Sample> {
-        let repeats = if self.quick {
-            Repeats { least: 1, most: 7, seconds: 0.01 }
-        } else {
-            Repeats { least: 3, most: 25, seconds: 0.05 }
+        let repeats = match (self.once, self.quick) {
+            (true, _) => Repeats { least: 1, most: 1, seconds: 0.0 },
+            (_, true) => Repeats { least: 1, most: 7, seconds: 0.01 },
+            // What takes half a second is run once more or not at all: its time does not hang on one interruption.
+            _ => Repeats { least: 1, most: 15, seconds: 0.4 },
         };
         let sample = self.table.push(measure(what, repeats, Some(counting::peak), work)?)?.clone();
         let order = sample.observed_order.map_or("-".to_string(), |order| format!("{order:.2}"));

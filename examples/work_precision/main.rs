@@ -62,7 +62,7 @@ fn work_precision() -> Result<bool, Box<dyn Error>> {
     #[cfg(feature = "rayon")]
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     fs::create_dir_all(&choice.out)?;
-    let mut bench = Bench::new(choice.quick, choice.out.clone());
+    let mut bench = Bench::new(choice.quick, choice.record, choice.out.clone());
     for (name, scene) in SCENES {
         if choice.scene.as_ref().is_none_or(|only| only == name) {
             let start = Instant::now();
