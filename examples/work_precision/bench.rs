@@ -35,7 +35,7 @@ impl Bench {
     ) -> parops::Result<Sample> {
         let repeats = match (self.once, self.quick) {
             (true, _) => Repeats { least: 1, most: 1, seconds: 0.0 },
-            (_, true) => Repeats { least: 1, most: 7, seconds: 0.01 },
+            (_, true) => Repeats { least: 1, most: 3, seconds: 0.03 },
             // What takes half a second is run once more or not at all: its time does not hang on one interruption.
             _ => Repeats { least: 1, most: 15, seconds: 0.4 },
         };
