@@ -16,7 +16,7 @@ use crate::kernel::MeshKernel;
 use crate::mesh::Remeshed;
 use crate::particles::Particles;
 use crate::scale::Volumes;
-use crate::time::{Entry, Plan, Stepper};
+use crate::time::{Entry, Plan, State, Stepper};
 
 /// The default constant C of the Lagrangian CFL condition dt |grad v|_2 <= C.
 pub const COURANT: f64 = 0.5;
@@ -288,7 +288,8 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
             return Err(SolverError::Limit { dt, limit, binding: binding.unwrap_or(Limit::Diffusion) }.into());
         }
         let mut work = std::mem::take(&mut self.work);
-        work.clone_from(&self.state);
+        // A clone of a pair would allocate.
+        work.assign(&self.state);
         let whole = within || self.policy == StepPolicy::Allow;
         let t = self.t;
         let done =
@@ -336,8 +337,8 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
 
     /// One step of the stepper, volumes and places checked.
     fn substep(&mut self, work: &mut MovingState<D, S::Value>, t: f64, dt: f64) -> Result<()> {
-        let Self { moving, stepper, .. } = self;
-        stepper.step(t, dt, work, &mut |t, state, rates| moving.rate(t, state, rates))?;
+        let Self { moving, stepper, state: checked, .. } = self;
+        stepper.step(t, dt, work, &mut |t, state, rates| moving.rate(t, state, checked, rates))?;
         if let Some((p, &volume)) = work.1.1.iter().enumerate().find(|(_, volume)| !(**volume > 0.0)) {
             return Err(crate::error::Error::from(SolverError::Volume { volume, t: t + dt }).at(p));
         }

@@ -197,18 +197,17 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
                 *prescribed = true;
             }
         });
-        let mut triplets = Vec::new();
-        for (p, x) in points.iter().enumerate() {
+        let row = |p: usize, entries: &mut Vec<(usize, f64)>| {
             if prescribed[p] {
-                triplets.push((p, p, 1.0));
-                continue;
+                entries.push((p, 1.0));
+                return;
             }
-            let mut entry = |q: usize, value: f64| triplets.push((p, q, value));
+            let (x, mut entry) = (&points[p], |q: usize, value: f64| entries.push((q, value)));
             self.scene.diffusion_term().entries(&self.diffusion, p, x, t, &mut entry);
             self.scene.advection_term().entries(&self.advection, p, x, t, &mut entry);
             entry(p, own(p));
-        }
-        let mut matrix = CsrMatrix::from_triplets(points.len(), points.len(), triplets)?;
+        };
+        let mut matrix = CsrMatrix::from_rows(points.len(), points.len(), row)?;
         if let Some(rows) = self.scene.edge().rows(&self.edge) {
             rows.replace_in(&mut matrix)?;
         }
