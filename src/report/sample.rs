@@ -61,7 +61,7 @@ impl Sample {
             squares += error * error;
             size += exact * exact;
             // A maximum would drop NaN.
-            largest = if error <= largest { largest } else { error };
+            largest = if largest.is_nan() || error <= largest { largest } else { error };
             highest = highest.max(exact.abs());
         }
         let scaled = |error: f64, size: f64| if size > 0.0 { error / size } else { error };

@@ -141,7 +141,7 @@ fn csv_faults_name_their_line() {
         refused(&csv.replacen("laplacian,2", "laplacian", 1)),
         ReportError::Cells { line: 2, found: 21, needed: 22 }
     );
-    assert_eq!(refused(&csv.replacen("\"b\"\"", "\"b\"", 1)), ReportError::Quote { line: 3 });
+    assert_eq!(refused(&csv.replacen("\"\"b", "\"b", 1)), ReportError::Quote { line: 3 });
     assert_eq!(refused(&format!("{csv}\"open")), ReportError::Quote { line: 5 });
     let parts = Seconds { neighbors: 1e-9, build: 0.1, apply: 1.0 / 3.0, step: 7.0 };
     let wrong = csv.replacen(&format!("{:e}", parts.total()), "8e0", 1);
