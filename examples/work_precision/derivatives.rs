@@ -4,6 +4,7 @@
 //! differences know where their neighbors are. Errors are relative, over all particles of the unit torus.
 
 use std::error::Error;
+use std::f64::consts::TAU;
 
 use parops::report::{Phase, Sample, Stopwatch, observed_order};
 use parops::{
@@ -43,7 +44,7 @@ fn claims(bench: &mut Bench) {
             let (first, last) = (series[0], series[series.len() - 1]);
             match (first.method.as_str(), first.order) {
                 ("FD" | "DC-PSE", order) => {
-                    let above = series.iter().rev().find(|sample| sample.error_l2 > ROUNDING);
+                    let above = series.iter().rev().find(|sample| sample.error_l2 > rounding(sample.h));
                     // What terms of higher order take on coarse sets is in proportion to r.
                     if let Some(found) = above.and_then(|sample| sample.observed_order) {
                         (low, high) = (low.min(found / f64::from(order)), high.max(found / f64::from(order)));
@@ -68,8 +69,11 @@ fn claims(bench: &mut Bench) {
     found.into_iter().for_each(|(scene, holds, text)| bench.claim(&scene, holds, text));
 }
 
-/// Errors below this are not asked for their order: a third derivative multiplies rounding by h^-3.
-const ROUNDING: f64 = 1e-9;
+/// Errors below this are not asked for their order: a third derivative multiplies rounding by (2 pi h)^-3, and the weights
+/// of high orders on scattered sets add up to hundreds in units of h^-3.
+fn rounding(h: f64) -> f64 {
+    1000.0 * f64::EPSILON / (TAU * h).powi(3)
+}
 
 fn all<const D: usize>(bench: &mut Bench, set: Set) -> parops::Result<()> {
     operator::<D, 1>(bench, set, "derivatives_laplacian", &Terms::laplacian())?;
