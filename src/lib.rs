@@ -33,7 +33,8 @@
 //! `kiddo`: a neighbor provider over an immutable k-d tree.
 //! `rayon`: rows are built and applied by several threads, with the same bits for any number of them.
 //! `serde`: rows and reports saved and read back bit for bit.
-//! `testing`: conformance checkers for kernels, providers, methods and steppers, ours and the user's own.
+//! `testing`: conformance checkers for kernels, providers, methods and steppers, ours and the user's own, and a harness
+//! that puts methods on curves of error against run time.
 
 mod apply;
 mod boundary;
@@ -91,6 +92,8 @@ pub use solver::*;
 pub use stencil::{Neighbor, Side, Stencil};
 pub use time::*;
 
+#[cfg(feature = "testing")]
+pub mod report;
 #[cfg(feature = "testing")]
 pub mod testing;
 

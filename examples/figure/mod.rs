@@ -28,6 +28,7 @@ pub enum Mark {
     Triangles,
     Crosses,
     CirclesAlone,
+    Squares,
 }
 
 /// Titles and kind of axes of one panel.
@@ -52,6 +53,9 @@ const PALETTE: [RGBColor; 10] = [
     RGBColor(128, 84, 60),
 ];
 
+/// Where a panel is drawn.
+pub type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+
 /// Draws panels side by side into one SVG file.
 pub fn draw(path: &Path, panels: &[(Axes, Vec<Curve>)]) -> Result<(), Box<dyn Error>> {
     let mut svg = String::new();
@@ -65,19 +69,33 @@ fn drawing<'a>(svg: &'a mut String, panels: &[(Axes, Vec<Curve>)]) -> Result<(),
     let root = SVGBackend::with_string(svg, (width, SIZE.1)).into_drawing_area();
     root.fill(&WHITE)?;
     for ((axes, curves), area) in panels.iter().zip(root.split_evenly((1, panels.len()))) {
-        let [x, y] = [bounds(curves, axes.logarithmic, |p| p.0), bounds(curves, axes.logarithmic, |p| p.1)];
-        if axes.logarithmic {
-            panel(&area, axes, curves, (x.0..x.1).log_scale(), (y.0..y.1).log_scale(), power_of_ten)?;
-        } else {
-            panel(&area, axes, curves, x.0..x.1, y.0..y.1, plain)?;
-        }
+        panel_of(&area, axes, curves, 1.0)?;
     }
     root.present()?;
     Ok(())
 }
 
+/// Draws one panel into an area; the ends of a logarithmic axis are at least the factor `span` apart.
+pub fn panel_of<'a>(area: &Area<'a>, axes: &Axes, curves: &[Curve], span: f64) -> Result<(), Box<dyn Error + 'a>> {
+    let [x, y] = [bounds(curves, axes.logarithmic, |p| p.0), bounds(curves, axes.logarithmic, |p| p.1)];
+    if axes.logarithmic {
+        let [x, y] = [x, y].map(|(low, high)| {
+            let more = (span * low / high).max(1.0).sqrt();
+            (low / more, high * more)
+        });
+        panel(area, axes, curves, (x.0..x.1).log_scale(), (y.0..y.1).log_scale(), power_of_ten)
+    } else {
+        panel(area, axes, curves, x.0..x.1, y.0..y.1, plain)
+    }
+}
+
+/// The color of this index.
+pub fn color(index: usize) -> RGBColor {
+    PALETTE[index % PALETTE.len()]
+}
+
 fn panel<'a, X, Y>(
-    area: &DrawingArea<SVGBackend<'a>, plotters::coord::Shift>,
+    area: &Area<'a>,
     axes: &Axes,
     curves: &[Curve],
     x: X,
@@ -107,7 +125,7 @@ where
         .axis_desc_style(("sans-serif", 17))
         .draw()?;
     for curve in curves {
-        let color = PALETTE[curve.color % PALETTE.len()];
+        let color = color(curve.color);
         let points = || curve.points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite());
         if curve.mark == Mark::Dashed {
             let dashes = DashedLineSeries::new(points(), 6, 5, color.stroke_width(1));
@@ -125,7 +143,10 @@ where
             Mark::Crosses => {
                 chart.draw_series(points().map(|p| Cross::new(p, 5, color.stroke_width(2))))?;
             }
-            Mark::Line | Mark::Dashed => {}
+            Mark::Line | Mark::Dashed | Mark::Squares => {}
+        }
+        if curve.mark == Mark::Squares {
+            chart.draw_series(points().map(|p| EmptyElement::at(p) + square((0, 0), 4, color)))?;
         }
         if !curve.name.is_empty() {
             let mark = curve.mark;
@@ -186,15 +207,22 @@ fn dense(points: &[(f64, f64)], logarithmic: bool) -> impl Iterator<Item = (f64,
         .filter(|p| p.0.is_finite() && p.1.is_finite())
 }
 
-fn legend<'a>(x: i32, y: i32, mark: Mark, color: RGBColor) -> DynElement<'static, SVGBackend<'a>, (i32, i32)> {
+/// What a curve looks like in a legend, at a place.
+pub fn legend<'a>(x: i32, y: i32, mark: Mark, color: RGBColor) -> DynElement<'static, SVGBackend<'a>, (i32, i32)> {
     let line = |width| PathElement::new(vec![(x, y), (x + 22, y)], color.stroke_width(width)).into_dyn();
     match mark {
         Mark::Circles | Mark::CirclesAlone => Circle::new((x + 11, y), 5, color.filled()).into_dyn(),
         Mark::Triangles => TriangleMarker::new((x + 11, y), 7, color.filled()).into_dyn(),
+        Mark::Squares => square((x + 11, y), 5, color).into_dyn(),
         Mark::Crosses => Cross::new((x + 11, y), 6, color.stroke_width(2)).into_dyn(),
         Mark::Line => line(2),
         Mark::Dashed => DashedPathElement::new([(x, y), (x + 22, y)], 6, 3, color.stroke_width(1)).into_dyn(),
     }
+}
+
+/// A square of twice this side.
+fn square((x, y): (i32, i32), half: i32, color: RGBColor) -> Rectangle<(i32, i32)> {
+    Rectangle::new([(x - half, y - half), (x + half, y + half)], color.filled())
 }
 
 /// The range of all points with a margin, in the measure of the axis.
