@@ -161,6 +161,9 @@ impl<Op, const R: u32, S> DcPse<Op, R, S> {
     /// Sets the fewest neighbors of a row in units of l, 2 by default; 1 is the least that can work, with condition
     /// numbers of 10^7 and more.
     ///
+    /// The error is no monotone function of n: a ratio that is best on one set is not on the next, so do not tune it on
+    /// one.
+    ///
     /// # Errors
     /// [`OperatorError::Setting`] below 1.
     pub fn neighbors_per_condition(mut self, ratio: f64) -> Result<Self> {
