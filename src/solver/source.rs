@@ -32,12 +32,15 @@ impl<F: Fn(&[f64; D], f64, E) -> E + Sync, const D: usize, E: Fields> SceneTerm<
     }
 
     fn limit(&self, (): &mut (), site: &Site<D>, t: f64, u: &[E], limits: &mut Limits) -> Result<()> {
-        let (mut fastest, scale) = (0.0_f64, difference(u));
+        let (mut fastest, scale) = ((0.0, None), difference(u));
         for (p, x) in site.free() {
             let Some(&u) = u.get(p) else { break };
-            fastest = fastest.max(decay(&self.0, x, t, u, scale).map_err(|error| error.at(p))?);
+            let decay = decay(&self.0, x, t, u, scale).map_err(|error| error.at(p))?;
+            if decay > fastest.0 {
+                fastest = (decay, Some(p));
+            }
         }
-        limits.add(Limit::Source, Rate::decay(fastest));
+        limits.add_of(Limit::Source, Rate::decay(fastest.0), fastest.1);
         Ok(())
     }
 
