@@ -58,6 +58,17 @@ pub fn row(separations: &[[f64; 2]], beta: [u32; 2], order: u32, epsilon: f64) -
     }
 }
 
+/// How much of the second moment a least-squares solution loses that drops singular values below rounding of the largest.
+pub fn least_squares(separations: &[[f64; 2]], beta: [u32; 2], order: u32, epsilon: f64) -> f64 {
+    let conditions = conditions(beta, order);
+    let power = |s: &[f64; 2], alpha: &[u32; 2]| (s[0] / epsilon).powi(alpha[0] as i32) * (s[1] / epsilon).powi(alpha[1] as i32);
+    let moments = DMatrix::from_fn(conditions.len(), separations.len(), |i, q| power(&separations[q], &conditions[i]));
+    let b = DVector::from_iterator(conditions.len(), conditions.iter().map(|alpha| if *alpha == beta { 2.0 } else { 0.0 }));
+    let cut = f64::EPSILON * separations.len() as f64 * moments.singular_values().max();
+    let weights = moments.clone().svd(true, true).solve(&b, cut).unwrap_or_else(|_| DVector::zeros(separations.len()));
+    (moments * weights - b).amax() / 2.0
+}
+
 /// The k nearest of a point, ties in the order of the numbers: as a sort and a cut leave them.
 pub fn cut(points: &[[f64; 2]], p: usize, k: usize, difference: impl Fn(&[f64; 2], &[f64; 2]) -> [f64; 2]) -> Vec<(usize, [f64; 2])> {
     let mut others: Vec<(usize, [f64; 2])> =
