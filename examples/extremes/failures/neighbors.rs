@@ -331,7 +331,7 @@ pub fn index_overflow(case: &mut Case, _: bool) -> Done {
     let first = refused[0].as_ref().map_or(String::from("accepted"), ToString::to_string);
     case.detects(refused.iter().all(too_many), format!("refused before anything is allocated: {first}"));
     let mesh = Mesh::cells(&Domain::periodic([0.0; 3], [TAU; 3])?, [1 << 22; 3]).err();
-    let typed = matches!(mesh.as_ref().map(parops::Error::kind), Some(ErrorKind::Mesh(MeshError::TooMany { .. }) | ErrorKind::Particle(ParticleError::TooMany { .. })));
+    let typed = matches!(mesh.as_ref().map(parops::Error::kind), Some(ErrorKind::Mesh(MeshError::Count { .. } | MeshError::TooLarge { .. })));
     case.prevents(typed, format!("2^66 cells: {}", mesh.map_or(String::from("accepted"), |error| error.to_string())));
     Ok(())
 }

@@ -44,7 +44,7 @@ pub fn wave(x: &[f64; 2]) -> f64 {
 }
 
 /// Its values at the particles.
-pub fn values(particles: &Particles<2>, f: impl Fn(&[f64; 2]) -> f64) -> Vec<f64> {
+pub fn values(particles: &Particles<2>, f: impl FnMut(&[f64; 2]) -> f64) -> Vec<f64> {
     particles.points().iter().map(f).collect()
 }
 
