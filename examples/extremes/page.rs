@@ -31,7 +31,11 @@ pub fn render(cases: &[Case], figures: &[Figure]) -> String {
     let mut from = 0;
     while let Some(first) = cases.get(from) {
         let count = cases[from..].iter().take_while(|case| case.catalogue == first.catalogue).count();
-        let _ = writeln!(html, "<h2>{}</h2>\n<table>\n<tr><th>#</th><th>set-up</th><th>a naive method</th><th>parops</th><th>verdict</th></tr>", escaped(first.catalogue));
+        let _ = writeln!(
+            html,
+            "<h2>{}</h2>\n<table>\n<tr><th>#</th><th>set-up</th><th>a naive method</th><th>parops</th><th>verdict</th></tr>",
+            escaped(first.catalogue)
+        );
         cases[from..from + count].iter().for_each(|case| row(&mut html, case));
         html.push_str("</table>\n");
         from += count;

@@ -11,3 +11,4 @@ mod remeshed;
 mod resume;
 mod scene;
 mod steady;
+mod watch;

@@ -49,7 +49,8 @@ pub fn ill_conditioned(case: &mut Case, quick: bool) -> Done {
     // A list that answers no farther than its rows: there is no room to widen them.
     let bounded = NeighborList::from_provider(&Exactly(&few))?;
     let refused = strict.assemble(&bounded);
-    let refusal = refused.as_ref().err().map(|error| (error.kind().clone(), error.particle().is_some(), error.wanted_cutoff()));
+    let refusal =
+        refused.as_ref().err().map(|error| (error.kind().clone(), error.particle().is_some(), error.wanted_cutoff()));
     let met = matches!(&refusal, Some((ErrorKind::Operator(OperatorError::TooFew { neighbors, conditions: CONDITIONS, needed: 40 }), true, Some(_))) if *neighbors < 40);
     case.reports(met, refused.err().map_or(String::from("accepted"), |error| error.to_string()));
 
@@ -58,7 +59,12 @@ pub fn ill_conditioned(case: &mut Case, quick: bool) -> Done {
     let (text, met) = match asked.assemble(&selected) {
         Ok(rows) => {
             let report = rows.report();
-            let text = format!("n = l asked for: every row certified to {:.0e}, the worst condition {:.1e} and sum |w| h^2 {:.1e} in the report", report.residual, report.condition, report.sum_abs * h * h);
+            let text = format!(
+                "n = l asked for: every row certified to {:.0e}, the worst condition {:.1e} and sum |w| h^2 {:.1e} in the report",
+                report.residual,
+                report.condition,
+                report.sum_abs * h * h
+            );
             (text, report.condition > 1e3 && report.condition.is_finite() && report.worst().is_some())
         }
         Err(error) => {
@@ -68,12 +74,15 @@ pub fn ill_conditioned(case: &mut Case, quick: bool) -> Done {
     };
     case.detects(met, text);
 
-    // Three times 1.15 in radius are 2.3 times in area, so that 24 become 40 and more.
-    let rows = strict.assemble(&Nearest::build(&particles, &Domain::open(), CONDITIONS + 4)?)?;
+    // Three times 1.15 in radius are 2.3 times in area; beside a face it is less.
+    let rows = strict.assemble(&Nearest::build(&particles, &Domain::open(), CONDITIONS + 10)?)?;
     let report = rows.report();
     case.adapts(
-        report.grown == report.rows && report.condition < 1e-2 * condition,
-        format!("the support of all {} rows grows by 1.15 until n = {} to {}; condition at most {:.0}, faces included", report.grown, report.fewest, report.most, report.condition),
+        report.grown == report.rows && report.condition < 0.1 * condition,
+        format!(
+            "the support of all {} rows grows by 1.15 until n = {} to {}; condition at most {:.0}, faces included",
+            report.grown, report.fewest, report.most, report.condition
+        ),
     );
     Ok(())
 }
@@ -125,7 +134,8 @@ pub fn lattice(case: &mut Case, _: bool) -> Done {
     let h = 1.0 / m as f64;
     case.setup("Laplacian of order 2 on the square lattice, n = l = 9 neighbors");
     let particles = Particles::lattice([0.0; 2], [1.0; 2], [m; 2])?;
-    let separations: Vec<[f64; 2]> = cut(particles.points(), p, CONDITIONS, wrapped).into_iter().map(|(_, s)| s).collect();
+    let separations: Vec<[f64; 2]> =
+        cut(particles.points(), p, CONDITIONS, wrapped).into_iter().map(|(_, s)| s).collect();
     let (xx, yy) = (row(&separations, [2, 0], 2, h), row(&separations, [0, 2], 2, h));
     let paraboloid = |x: &[f64; 2]| x[0] * x[0] + x[1] * x[1];
     let found = xx.apply(&separations, paraboloid) + yy.apply(&separations, paraboloid);
@@ -142,7 +152,9 @@ pub fn lattice(case: &mut Case, _: bool) -> Done {
     let typed = refusal.as_ref().is_some_and(|error| {
         let ErrorKind::Operator(kind) = error.kind() else { return false };
         let deficient = match kind {
-            OperatorError::Singular { rank, conditions, .. } | OperatorError::Uncertified { rank, conditions, .. } => rank < conditions,
+            OperatorError::Singular { rank, conditions, .. } | OperatorError::Uncertified { rank, conditions, .. } => {
+                rank < conditions
+            }
             _ => false,
         };
         deficient && error.particle().is_some()
@@ -162,8 +174,16 @@ pub fn lattice(case: &mut Case, _: bool) -> Done {
     let mut same = vec![0.0; field.len()];
     ours.apply(&field, &mut same)?;
     case.adapts(
-        rows.report().fewest == 12 && (lap[p] - 4.0).abs() < 1e-10 && ours.report().fewest >= 2 * CONDITIONS && (same[p] - 4.0).abs() < 1e-10,
-        format!("whole shells: 9 asked for give {} neighbors, by default there are {}; both give 4 to {:.0e}", rows.report().fewest, ours.report().fewest, (lap[p] - 4.0).abs().max((same[p] - 4.0).abs())),
+        rows.report().fewest == 12
+            && (lap[p] - 4.0).abs() < 1e-10
+            && ours.report().fewest >= 2 * CONDITIONS
+            && (same[p] - 4.0).abs() < 1e-10,
+        format!(
+            "whole shells: 9 asked for give {} neighbors, by default there are {}; both give 4 to {:.0e}",
+            rows.report().fewest,
+            ours.report().fewest,
+            (lap[p] - 4.0).abs().max((same[p] - 4.0).abs())
+        ),
     );
     Ok(())
 }
@@ -174,18 +194,25 @@ pub fn shell_cut(case: &mut Case, quick: bool) -> Done {
     let h = 1.0 / m as f64;
     case.setup(format!("advection by DC-PSE of order 2 ('-'), {m}x{m} lattice on a torus, the 14 nearest"));
     let particles = Particles::lattice([0.0; 2], [1.0; 2], [m; 2])?;
-    let method = DcPse::at_order(Expression::of(&Along([-0.8, 0.6]))?, 2)?.sign(Sign::Minus).neighbors_per_condition(1.5)?;
+    let method =
+        DcPse::at_order(Expression::of(&Along([-0.8, 0.6]))?, 2)?.sign(Sign::Minus).neighbors_per_condition(1.5)?;
     let spectrum = |rows: &Rows| SpectrumEstimator::new().of(rows);
     let list = cut_list(&particles, 14)?;
     let arbitrary = spectrum(&method.assemble(&list)?)?;
     case.naive(
         arbitrary.abscissa * h > 1e-3,
-        format!("ties broken by number: max Re(lambda) h = {:.3}, modes grow on a perfect lattice", arbitrary.abscissa * h),
+        format!(
+            "ties broken by number: max Re(lambda) h = {:.3}, modes grow on a perfect lattice",
+            arbitrary.abscissa * h
+        ),
     );
     let whole = Nearest::build(&particles, &torus()?, 14)?;
-    let single = |provider: &dyn Fn() -> parops::Result<HalfList<2>>| provider().map(|half| (half.mutual(), half.single()));
+    let single =
+        |provider: &dyn Fn() -> parops::Result<HalfList<2>>| provider().map(|half| (half.mutual(), half.single()));
     let (mutual, one_sided) = single(&|| HalfList::from_provider(&list, Cutoff(list.reach())))?;
-    let (pairs, none) = single(&|| HalfList::from_provider(&NeighborList::from_provider(&Exactly(&whole))?, Cutoff(Exactly(&whole).reach())))?;
+    let (pairs, none) = single(&|| {
+        HalfList::from_provider(&NeighborList::from_provider(&Exactly(&whole))?, Cutoff(Exactly(&whole).reach()))
+    })?;
     case.reports(
         one_sided > 0 && none == 0,
         format!("asymmetry: a half list finds {one_sided} pairs beside {mutual} in which only one knows the other; with whole shells {none} beside {pairs}"),
@@ -193,7 +220,11 @@ pub fn shell_cut(case: &mut Case, quick: bool) -> Done {
     let ours = spectrum(&method.assemble(&whole)?)?;
     case.adapts(
         ours.abscissa <= 1e-8 * ours.radius && whole.count(0, whole.cutoff(0)) == 20,
-        format!("a cutoff by radius, ties in: {} neighbors, max Re(lambda) h = {:.0e}", whole.count(0, whole.cutoff(0)), ours.abscissa * h),
+        format!(
+            "a cutoff by radius, ties in: {} neighbors, max Re(lambda) h = {:.0e}",
+            whole.count(0, whole.cutoff(0)),
+            ours.abscissa * h
+        ),
     );
     Ok(())
 }
@@ -209,10 +240,11 @@ pub fn unscaled(case: &mut Case, _: bool) -> Done {
     let around = |set: &Particles<2>| cut(set.points(), p, 40, plain).into_iter().map(|(_, s)| s).collect::<Vec<_>>();
     let milder = Particles::new(unit.points().iter().map(|x| x.map(|x| x / 64.0)).collect())?;
     let (scaled, raw) = (row(&around(&unit), [2, 0], 4, 2.0), row(&around(&milder), [2, 0], 4, 1.0));
-    let (fitted, lost) = (least_squares(&around(&unit), [2, 0], 4, 2.0), least_squares(&around(&shrunk), [2, 0], 4, 1.0));
+    let (fitted, lost) =
+        (least_squares(&around(&unit), [2, 0], 4, 1.0), least_squares(&around(&shrunk), [2, 0], 4, small));
     case.naive(
-        raw.condition > 64.0_f64.powi(4) * scaled.condition && lost > 0.1 && fitted < 1e-10,
-        format!("condition {:.0}, {:.1e} for spacing 1/64 already; least squares then drop the small singular values and miss the second moment by {:.0} %", scaled.condition, raw.condition, 100.0 * lost),
+        raw.condition > 64.0_f64.powi(4) * scaled.condition && lost > 1e6 * fitted && lost > 0.01,
+        format!("condition {:.0}, {:.1e} for spacing 1/64 already; least squares on the raw monomials drop small singular values and miss a moment by {lost:.1e} h^(k - 2) in place of {fitted:.0e}", scaled.condition, raw.condition),
     );
     let method = dcpse(laplacian()?, 4)?;
     let rows = |set: &Particles<2>| method.assemble(&nearest(set, &Domain::open(), &method)?.canonical());
@@ -220,7 +252,8 @@ pub fn unscaled(case: &mut Case, _: bool) -> Done {
     let scale = small.powi(-2);
     let equal = (0..unit.len()).all(|p| match (large.row(p), tiny.row(p)) {
         (Some(a), Some(b)) => {
-            a.sources == b.sources && a.weights.iter().zip(b.weights).all(|([a], [b])| (a * scale).to_bits() == b.to_bits())
+            a.sources == b.sources
+                && a.weights.iter().zip(b.weights).all(|([a], [b])| (a * scale).to_bits() == b.to_bits())
         }
         _ => false,
     });
@@ -242,7 +275,8 @@ pub fn one_sided(case: &mut Case, quick: bool) -> Done {
     let interior = inside(m, &particles, 6.0);
     let naive = |of: &[usize]| {
         let gain = |&p: &usize| {
-            let separations: Vec<[f64; 2]> = cut(particles.points(), p, 40, plain).into_iter().map(|(_, s)| s).collect();
+            let separations: Vec<[f64; 2]> =
+                cut(particles.points(), p, 40, plain).into_iter().map(|(_, s)| s).collect();
             row(&separations, [2, 0], 4, 2.0 * h).gain(h, 2)
         };
         of.iter().map(gain).fold(0.0, f64::max)
@@ -275,35 +309,51 @@ pub fn one_sided(case: &mut Case, quick: bool) -> Done {
 }
 
 /// 32. The size of a stencil tuned on one scene.
-pub fn stencil_size(case: &mut Case, quick: bool) -> Done {
+pub fn stencil_size(case: &mut Case, _: bool) -> Done {
     const CONDITIONS: usize = 9;
-    let m = if quick { 20 } else { 32 };
-    let sizes: Vec<usize> = (CONDITIONS + 3..=4 * CONDITIONS).collect();
-    case.setup(format!("Laplacian of order 2 on {m}x{m} particles, jitter 0.3 h, n = {} to {} neighbors", sizes[0], 4 * CONDITIONS));
+    const M: usize = 20;
+    case.setup(format!(
+        "Laplacian of order 2 on {M}x{M} particles, jitter 0.3 h, n = 9 to 36 neighbors, read at one particle"
+    ));
     let method = dcpse(laplacian()?, 2)?.neighbors_per_condition(1.0)?;
-    let curve = |seed: u64| -> parops::Result<Vec<f64>> {
-        let particles = square(m, 0.3, seed)?;
-        let factor = -8.0 * std::f64::consts::PI.powi(2);
+    let factor = -8.0 * std::f64::consts::PI.powi(2);
+    let p = M * M / 2 + 7;
+    // The error at one particle, and over all, for every n.
+    let curves = |seed: u64| -> parops::Result<(Vec<f64>, Vec<f64>)> {
+        let particles = square(M, 0.3, seed)?;
         let (u, exact) = (values(&particles, wave), values(&particles, |x| factor * wave(x)));
         let mut lap = vec![0.0; u.len()];
-        let error = |&n: &usize| {
-            let rows = method.assemble(&Exactly(&Nearest::build(&particles, &torus()?, n)?))?;
-            rows.apply(&u, &mut lap)?;
-            Ok(relative_error(&lap, &exact))
-        };
-        sizes.iter().map(error).collect()
+        let (mut here, mut all) = (Vec::new(), Vec::new());
+        for n in CONDITIONS..=4 * CONDITIONS {
+            method.assemble(&Exactly(&Nearest::build(&particles, &torus()?, n)?))?.apply(&u, &mut lap)?;
+            here.push(((lap[p] - exact[p]) / factor).abs());
+            all.push(relative_error(&lap, &exact));
+        }
+        Ok((here, all))
     };
-    let (tuned, other) = (curve(1)?, curve(2)?);
-    let turns = tuned.windows(3).filter(|e| (e[1] - e[0]) * (e[2] - e[1]) < 0.0).count();
-    let least = |errors: &[f64]| (0..errors.len()).min_by(|&a, &b| errors[a].total_cmp(&errors[b])).unwrap_or(0);
-    let (best, there) = (least(&tuned), least(&other));
+    let ((tuned, all), (other, _)) = (curves(1)?, curves(2)?);
+    let turns = |errors: &[f64]| errors.windows(3).filter(|e| (e[1] - e[0]) * (e[2] - e[1]) < 0.0).count();
+    let best =
+        |errors: &[f64]| (0..errors.len()).min_by(|&a, &b| errors[a].total_cmp(&errors[b])).unwrap_or(0) + CONDITIONS;
     case.naive(
-        turns >= 2,
-        format!("errors {} turn {turns} times; n = {} is best on one set and n = {} on another", listed(tuned.iter().copied()), sizes[best], sizes[there]),
+        turns(&tuned) >= 4 && turns(&other) >= 4 && best(&tuned).abs_diff(best(&other)) >= 4,
+        format!(
+            "the error turns {} and {} times; n = {} is best on one set and n = {} on another of the same kind",
+            turns(&tuned),
+            turns(&other),
+            best(&tuned),
+            best(&other)
+        ),
+    );
+    let default = 2 * CONDITIONS;
+    let (least, ours) = (all.iter().copied().fold(f64::INFINITY, f64::min), all[default - CONDITIONS]);
+    case.prevents(
+        ours < 2.0 * least && turns(&all[3..]) <= 2,
+        format!("over all particles the error hardly turns ({} times from n = 12 on): {} at n = 9, 12, 18, 36; the default, 18, is at {:.1} times the least", turns(&all[3..]), listed([all[0], all[3], ours, all[27]]), ours / least),
     );
     case.documents(
         include_str!("../../../src/operator/dcpse/mod.rs"),
-        "The error is no monotone function of n: a ratio that is best on one set is not on the next, so do not tune it on one.",
+        "The error at a particle goes up and down with n, and what is best on one set is not on the next: do not tune the ratio on one scene.",
     );
     Ok(())
 }

@@ -36,7 +36,8 @@ pub fn row(separations: &[[f64; 2]], beta: [u32; 2], order: u32, epsilon: f64) -
     let z: Vec<[f64; 2]> = separations.iter().map(|s| s.map(|s| s / epsilon)).collect();
     let reach = z.iter().map(|z| z[0].hypot(z[1])).fold(0.0, f64::max);
     // The window falls to exp(-4.84) at the farthest neighbor, as that of the library does.
-    let root: Vec<f64> = z.iter().map(|z| (-0.5 * 4.84 * (z[0] * z[0] + z[1] * z[1]) / (reach * reach)).exp()).collect();
+    let root: Vec<f64> =
+        z.iter().map(|z| (-0.5 * 4.84 * (z[0] * z[0] + z[1] * z[1]) / (reach * reach)).exp()).collect();
     let windowed = DMatrix::from_fn(z.len(), conditions.len(), |q, i| root[q] * power(&z[q], &conditions[i]));
     let required = |alpha: &[u32; 2]| {
         let factorial = |n: u32| (1..=n).map(f64::from).product::<f64>();
@@ -58,19 +59,32 @@ pub fn row(separations: &[[f64; 2]], beta: [u32; 2], order: u32, epsilon: f64) -
     }
 }
 
-/// How much of the second moment a least-squares solution loses that drops singular values below rounding of the largest.
-pub fn least_squares(separations: &[[f64; 2]], beta: [u32; 2], order: u32, epsilon: f64) -> f64 {
+/// The largest miss of a moment of degree k, over h^(k - m), by least squares on raw monomials that drop singular values
+/// below rounding of the largest.
+pub fn least_squares(separations: &[[f64; 2]], beta: [u32; 2], order: u32, h: f64) -> f64 {
     let conditions = conditions(beta, order);
-    let power = |s: &[f64; 2], alpha: &[u32; 2]| (s[0] / epsilon).powi(alpha[0] as i32) * (s[1] / epsilon).powi(alpha[1] as i32);
+    let power = |s: &[f64; 2], alpha: &[u32; 2]| s[0].powi(alpha[0] as i32) * s[1].powi(alpha[1] as i32);
     let moments = DMatrix::from_fn(conditions.len(), separations.len(), |i, q| power(&separations[q], &conditions[i]));
-    let b = DVector::from_iterator(conditions.len(), conditions.iter().map(|alpha| if *alpha == beta { 2.0 } else { 0.0 }));
+    let b =
+        DVector::from_iterator(conditions.len(), conditions.iter().map(|alpha| if *alpha == beta { 2.0 } else { 0.0 }));
     let cut = f64::EPSILON * separations.len() as f64 * moments.singular_values().max();
     let weights = moments.clone().svd(true, true).solve(&b, cut).unwrap_or_else(|_| DVector::zeros(separations.len()));
-    (moments * weights - b).amax() / 2.0
+    let degree = (beta[0] + beta[1]) as i32;
+    let miss = (moments * weights - b)
+        .iter()
+        .zip(&conditions)
+        .map(|(miss, alpha)| miss.abs() * h.powi(degree - (alpha[0] + alpha[1]) as i32))
+        .fold(0.0, f64::max);
+    miss
 }
 
 /// The k nearest of a point, ties in the order of the numbers: as a sort and a cut leave them.
-pub fn cut(points: &[[f64; 2]], p: usize, k: usize, difference: impl Fn(&[f64; 2], &[f64; 2]) -> [f64; 2]) -> Vec<(usize, [f64; 2])> {
+pub fn cut(
+    points: &[[f64; 2]],
+    p: usize,
+    k: usize,
+    difference: impl Fn(&[f64; 2], &[f64; 2]) -> [f64; 2],
+) -> Vec<(usize, [f64; 2])> {
     let mut others: Vec<(usize, [f64; 2])> =
         (0..points.len()).filter(|&q| q != p).map(|q| (q, difference(&points[p], &points[q]))).collect();
     let square = |s: &[f64; 2]| s[0] * s[0] + s[1] * s[1];

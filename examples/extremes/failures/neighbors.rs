@@ -4,8 +4,9 @@ use std::error::Error;
 use std::f64::consts::TAU;
 
 use parops::{
-    Apply, BruteForce, CellList, Cutoff, Domain, DomainError, ErrorKind, Fallback, Laplacian, Mesh, MeshError, Nearest, NeighborError,
-    NeighborList, Neighbors, PARTICLES_HIGH, ParticleError, Particles, Pse, Rows, Selected, epsilon_from_neighbors,
+    Apply, BruteForce, CellList, Cutoff, Domain, DomainError, ErrorKind, Fallback, Laplacian, Mesh, MeshError, Nearest,
+    NeighborError, NeighborList, Neighbors, PARTICLES_HIGH, ParticleError, Particles, Pse, Rows, Selected,
+    epsilon_from_neighbors,
 };
 
 use super::sets::{cells, dcpse, laplacian, square, torus, values, wave};
@@ -50,7 +51,11 @@ pub fn images(case: &mut Case, _: bool) -> Done {
             let s = super::naive_dcpse::wrapped(x, y);
             s[0] * s[0] + s[1] * s[1] <= cutoff * cutoff
         };
-        points.iter().enumerate().map(|(p, x)| points.iter().enumerate().filter(|(q, y)| *q != p && within(x, y)).count()).sum::<usize>()
+        points
+            .iter()
+            .enumerate()
+            .map(|(p, x)| points.iter().enumerate().filter(|(q, y)| *q != p && within(x, y)).count())
+            .sum::<usize>()
     };
     // Two cells an axis, their eight neighbors visited without a look at which are the same.
     let two_cells = |cutoff: f64| {
@@ -93,10 +98,15 @@ pub fn images(case: &mut Case, _: bool) -> Done {
 
 /// 23. A coordinate that wraps onto the upper face.
 pub fn wrap(case: &mut Case, _: bool) -> Done {
-    case.setup("x = -1e-17 and its neighbors in floating point, periodic boxes [0, 1), [-1, 1), [0.1, 0.7), [1e6, 1e6 + 1)");
+    case.setup(
+        "x = -1e-17 and its neighbors in floating point, periodic boxes [0, 1), [-1, 1), [0.1, 0.7), [1e6, 1e6 + 1)",
+    );
     let naive = (-1e-17_f64).rem_euclid(1.0);
     let cell = (naive / 0.25) as usize;
-    case.naive(naive == 1.0 && cell == 4, format!("x mod 1 = {naive}, which is the upper face: cell {cell} of 4, counted from 0"));
+    case.naive(
+        naive == 1.0 && cell == 4,
+        format!("x mod 1 = {naive}, which is the upper face: cell {cell} of 4, counted from 0"),
+    );
     let (mut wrong, mut tried) = (0, 0);
     for (low, high) in [(0.0, 1.0), (-1.0, 1.0), (0.1, 0.7), (1e6, 1e6 + 1.0)] {
         let domain = Domain::periodic([low], [high])?;
@@ -117,7 +127,13 @@ pub fn wrap(case: &mut Case, _: bool) -> Done {
             }
         }
     }
-    case.adapts(wrong == 0, format!("half-open: of {tried} places within 4 ulp of a face {wrong} leave the box; -1e-17 becomes {}", Domain::periodic([0.0], [1.0])?.wrap(&[-1e-17])?[0]));
+    case.adapts(
+        wrong == 0,
+        format!(
+            "half-open: of {tried} places within 4 ulp of a face {wrong} leave the box; -1e-17 becomes {}",
+            Domain::periodic([0.0], [1.0])?.wrap(&[-1e-17])?[0]
+        ),
+    );
     Ok(())
 }
 
@@ -127,7 +143,8 @@ pub fn seams(case: &mut Case, quick: bool) -> Done {
     case.setup(format!("diffusion by PSE on {m}x{m} particles, jitter 0.1 h, {steps} steps by 1, 2, 3 and 8 threads, each with its own part"));
     let particles = square(m, 0.1, 4)?;
     let h = 1.0 / m as f64;
-    let method = Pse::new(Laplacian::<2>, 2, particles.spacing()?.epsilon(1.5)?, particles.volumes()?)?.moment_tolerance(1.0)?;
+    let method =
+        Pse::new(Laplacian::<2>, 2, particles.spacing()?.epsilon(1.5)?, particles.volumes()?)?.moment_tolerance(1.0)?;
     let around = cells(&particles, &torus()?, method.cutoff().0)?;
     let dt = 0.1 * h * h;
     let start = values(&particles, wave);
@@ -161,13 +178,17 @@ pub fn seams(case: &mut Case, quick: bool) -> Done {
     let different = |a: &[f64], b: &[f64]| a.iter().zip(b).filter(|(a, b)| a.to_bits() != b.to_bits()).count();
     let one = scattered(1);
     let naive: Vec<usize> = [2, 3, 8].map(|threads| different(&one, &scattered(threads))).to_vec();
-    case.naive(naive.iter().all(|count| *count > 0), format!("values that differ from those of one thread, for 2, 3 and 8: {naive:?} of {}", m * m));
+    case.naive(
+        naive.iter().all(|count| *count > 0),
+        format!("values that differ from those of one thread, for 2, 3 and 8: {naive:?} of {}", m * m),
+    );
 
     // Every thread owns the rows of its part, and reads the whole field.
     let owned = |threads: usize| -> parops::Result<Vec<f64>> {
         let targets = |t: usize| (0..m * m).filter(|p| p * threads / (m * m) == t).collect::<Vec<_>>();
         let parts: Vec<Vec<usize>> = (0..threads).map(targets).collect();
-        let rows: Vec<Rows> = parts.iter().map(|part| method.assemble(&Selected::new(&around, part)?)).collect::<Result<_, _>>()?;
+        let rows: Vec<Rows> =
+            parts.iter().map(|part| method.assemble(&Selected::new(&around, part)?)).collect::<Result<_, _>>()?;
         let (mut u, mut lap) = (start.clone(), vec![0.0; m * m]);
         for _ in 0..steps {
             let mut rest = lap.as_mut_slice();
@@ -187,8 +208,12 @@ pub fn seams(case: &mut Case, quick: bool) -> Done {
         Ok(u)
     };
     let one = owned(1)?;
-    let ours: Vec<usize> = [2, 3, 8].iter().map(|&threads| owned(threads).map(|u| different(&one, &u))).collect::<Result<_, _>>()?;
-    case.prevents(ours.iter().all(|count| *count == 0), format!("each row by one owner in its own order: {ours:?} values differ"));
+    let ours: Vec<usize> =
+        [2, 3, 8].iter().map(|&threads| owned(threads).map(|u| different(&one, &u))).collect::<Result<_, _>>()?;
+    case.prevents(
+        ours.iter().all(|count| *count == 0),
+        format!("each row by one owner in its own order: {ours:?} values differ"),
+    );
     #[cfg(feature = "rayon")]
     {
         let mut pools = Vec::new();
@@ -205,7 +230,10 @@ pub fn seams(case: &mut Case, quick: bool) -> Done {
             })?);
         }
         let counts: Vec<usize> = pools.iter().map(|u| different(&one, u)).collect();
-        case.prevents(counts.iter().all(|count| *count == 0), format!("pools of 1, 2, 3 and 8 threads inside the library: {counts:?}"));
+        case.prevents(
+            counts.iter().all(|count| *count == 0),
+            format!("pools of 1, 2, 3 and 8 threads inside the library: {counts:?}"),
+        );
     }
     Ok(())
 }
@@ -251,7 +279,8 @@ pub fn duplicates(case: &mut Case, quick: bool) -> Done {
     let list = CellList::build(&line, &Domain::open(), Cutoff(1.5e-4))?;
     // Whoever is within one step of the last digit, counted from the sorted values.
     rounded.sort_by(f64::total_cmp);
-    let expected = |x: f64| rounded.partition_point(|y| *y <= x + 1.5e-4) - rounded.partition_point(|y| *y < x - 1.5e-4) - 1;
+    let expected =
+        |x: f64| rounded.partition_point(|y| *y <= x + 1.5e-4) - rounded.partition_point(|y| *y < x - 1.5e-4) - 1;
     let right = (0..count).step_by(97).filter(|&p| list.count(p, 1.5e-4) == expected(line.points()[p][0])).count();
     case.prevents(
         agree && right == count.div_ceil(97),
@@ -269,7 +298,11 @@ pub fn isolated(case: &mut Case, _: bool) -> Done {
     points.push([1.0 + 40.0 * h, 0.5]);
     let lonely = points.len() - 1;
     let count = |p: usize, r: f64| {
-        points.iter().enumerate().filter(|(q, y)| *q != p && (y[0] - points[p][0]).hypot(y[1] - points[p][1]) <= r).count()
+        points
+            .iter()
+            .enumerate()
+            .filter(|(q, y)| *q != p && (y[0] - points[p][0]).hypot(y[1] - points[p][1]) <= r)
+            .count()
     };
     let mut radius = 3.0 * h;
     let mut deleted = true;
@@ -283,7 +316,12 @@ pub fn isolated(case: &mut Case, _: bool) -> Done {
         radius *= (0.5 + 0.5 * (WANTED as f64 / found.max(1) as f64).sqrt()).clamp(0.8, 1.01);
     }
     let naive = count(lonely, radius);
-    case.naive(deleted, format!("no convergence: {naive} neighbors after 30 rounds, so the particle is dropped or its rates are set to zero"));
+    case.naive(
+        deleted,
+        format!(
+            "no convergence: {naive} neighbors after 30 rounds, so the particle is dropped or its rates are set to zero"
+        ),
+    );
 
     let particles = Particles::new(points.clone())?;
     let open = Domain::open();
@@ -300,13 +338,22 @@ pub fn isolated(case: &mut Case, _: bool) -> Done {
     let worst = report.worst().map(|row| (row.target, row.empty));
     case.reports(
         refused.is_some() && report.rows == points.len() && report.empty >= 1 && worst == Some((lonely, true)),
-        format!("rows: {}; an empty row is only left where that is asked for, and counted: {} of {}, particle {}", refused.map_or(String::from("accepted"), |error| error.to_string()), report.empty, report.rows, worst.map_or(0, |(p, _)| p)),
+        format!(
+            "rows: {}; an empty row is only left where that is asked for, and counted: {} of {}, particle {}",
+            refused.map_or(String::from("accepted"), |error| error.to_string()),
+            report.empty,
+            report.rows,
+            worst.map_or(0, |(p, _)| p)
+        ),
     );
     let all = Nearest::build(&particles, &open, WANTED)?;
     let found = all.count(lonely, all.cutoff(lonely));
     case.adapts(
         found >= WANTED && found <= WANTED + 5 && all.targets() == points.len(),
-        format!("a cutoff per particle by search, not by iteration: {found} neighbors within {:.1} h of it", all.cutoff(lonely) / h),
+        format!(
+            "a cutoff per particle by search, not by iteration: {found} neighbors within {:.1} h of it",
+            all.cutoff(lonely) / h
+        ),
     );
     Ok(())
 }
@@ -318,20 +365,24 @@ pub fn index_overflow(case: &mut Case, _: bool) -> Done {
     let order: Vec<u8> = (0..points.len()).map(|i| i as u8).collect();
     let wrong = (1..points.len()).filter(|&i| points[order[i] as usize] - points[order[i - 1] as usize] != 0.5).count();
     let distance = (points[order[256] as usize] - points[order[0] as usize]).abs();
-    case.naive(wrong > 0 && distance == 0.0, format!("the cast wraps: point 256 is taken for point 0, distance {distance}, without an error"));
+    case.naive(
+        wrong > 0 && distance == 0.0,
+        format!("the cast wraps: point 256 is taken for point 0, distance {distance}, without an error"),
+    );
     let refused = [
         Particles::<3>::lattice([0.0; 3], [1.0; 3], [2000; 3]).err(),
         Particles::<3>::lattice([0.0; 3], [1.0; 3], [1 << 22; 3]).err(),
         Particles::<2>::random([0.0; 2], [1.0; 2], PARTICLES_HIGH + 1, 1).err(),
         Particles::<2>::quasi_random([0.0; 2], [1.0; 2], usize::MAX, 1).err(),
     ];
-    let too_many = |error: &Option<parops::Error>| {
-        matches!(error.as_ref().map(parops::Error::kind), Some(ErrorKind::Particle(ParticleError::TooMany { limit: PARTICLES_HIGH, count })) if *count > PARTICLES_HIGH)
-    };
+    let too_many = |error: &Option<parops::Error>| matches!(error.as_ref().map(parops::Error::kind), Some(ErrorKind::Particle(ParticleError::TooMany { limit: PARTICLES_HIGH, count })) if *count > PARTICLES_HIGH);
     let first = refused[0].as_ref().map_or(String::from("accepted"), ToString::to_string);
     case.detects(refused.iter().all(too_many), format!("refused before anything is allocated: {first}"));
     let mesh = Mesh::cells(&Domain::periodic([0.0; 3], [TAU; 3])?, [1 << 22; 3]).err();
-    let typed = matches!(mesh.as_ref().map(parops::Error::kind), Some(ErrorKind::Mesh(MeshError::Count { .. } | MeshError::TooLarge { .. })));
+    let typed = matches!(
+        mesh.as_ref().map(parops::Error::kind),
+        Some(ErrorKind::Mesh(MeshError::Count { .. } | MeshError::TooLarge { .. }))
+    );
     case.prevents(typed, format!("2^66 cells: {}", mesh.map_or(String::from("accepted"), |error| error.to_string())));
     Ok(())
 }

@@ -78,7 +78,10 @@ pub fn overlap_lost(case: &mut Case, quick: bool) -> Done {
     let drift = row.fields[0].drift.abs() / row.fields[0].size;
     case.adapts(
         row.remeshings > 0 && row.hole <= 1.2 && row.gap >= 0.4 && drift < 1e-13,
-        format!("remeshed {} times when overlap is lost: hole {:.2} and gap {:.2} at t = {end}, mass drift {drift:.0e}", row.remeshings, row.hole, row.gap),
+        format!(
+            "remeshed {} times when overlap is lost: hole {:.2} and gap {:.2} at t = {end}, mass drift {drift:.0e}",
+            row.remeshings, row.hole, row.gap
+        ),
     );
     Ok(())
 }
@@ -104,7 +107,13 @@ pub fn clustering(case: &mut Case, quick: bool) -> Done {
     let quality = SetQuality::measure(&run.particles()?, &torus()?, Cutoff(3.0 * h))?;
     case.reports(
         quality.fewest.abs_diff(fewest) <= 1 && quality.most.abs_diff(most) <= 2 && quality.loneliest.is_some(),
-        format!("{} to {} neighbors, median {}, fewest at particle {}", quality.fewest, quality.most, quality.median, quality.loneliest.unwrap_or(0)),
+        format!(
+            "{} to {} neighbors, median {}, fewest at particle {}",
+            quality.fewest,
+            quality.most,
+            quality.median,
+            quality.loneliest.unwrap_or(0)
+        ),
     );
     Ok(())
 }
@@ -171,18 +180,26 @@ pub fn pairing(case: &mut Case, quick: bool) -> Done {
     let gap = |set: &Particles<2>| -> parops::Result<f64> { Ok(least_gap(&cells(set, &torus()?, 2.0 * h)?) / h) };
     let (paired, apart) = (gap(&spline)?, gap(&wendland)?);
     case.naive(paired < 0.1, format!("cubic spline: the particles form pairs, least gap {paired:.1e} h"));
-    let quality = [&spline, &wendland].map(|set| SetQuality::measure(set, &torus().expect("a legal box"), Cutoff(2.0 * h)));
+    let quality =
+        [&spline, &wendland].map(|set| SetQuality::measure(set, &torus().expect("a legal box"), Cutoff(2.0 * h)));
     let [pairs, none] = quality;
     let (pairs, none) = (pairs?, none?);
     case.reports(
         (pairs.separation / h - paired).abs() < 1e-9 && pairs.closest.is_some() && none.separation > 0.6 * h,
-        format!("the least gap, {:.1e} h at particle {}; with Wendland C2 it stays {apart:.2} h", pairs.separation / h, pairs.closest.unwrap_or(0)),
+        format!(
+            "the least gap, {:.1e} h at particle {}; with Wendland C2 it stays {apart:.2} h",
+            pairs.separation / h,
+            pairs.closest.unwrap_or(0)
+        ),
     );
     case.documents(
         include_str!("../../../src/kernel/spline.rs"),
         "particles that move along -grad sum_q W form pairs where the overlap is large: in two dimensions from epsilon = 1.3 h on",
     );
-    case.documents(include_str!("../../../src/kernel/wendland.rs"), "Positive definite in D dimensions: no pairing for any number of neighbors.");
+    case.documents(
+        include_str!("../../../src/kernel/wendland.rs"),
+        "Positive definite in D dimensions: no pairing for any number of neighbors.",
+    );
     Ok(())
 }
 
@@ -219,7 +236,10 @@ pub fn tensile(case: &mut Case, quick: bool) -> Done {
     let gap = least_gap(&cells(&clumped, &torus()?, 2.0 * h)?) / h;
     case.naive(
         gap < 0.8 && tension[tension.len() - 1] > 20.0 * tension[0],
-        format!("the particles clump: least gap {gap:.2} h, noise {:.0} times what it was", tension[tension.len() - 1] / tension[0]),
+        format!(
+            "the particles clump: least gap {gap:.2} h, noise {:.0} times what it was",
+            tension[tension.len() - 1] / tension[0]
+        ),
     );
     // While it is small the noise grows by the same factor from measurement to measurement.
     let linear: Vec<f64> = tension.windows(2).skip(3).take_while(|d| d[1] < 0.03).map(|d| d[1] / d[0]).collect();
@@ -257,13 +277,19 @@ pub fn frozen_volumes(case: &mut Case, _: bool) -> Done {
         frozen.iter().all(|error| *error > 0.1) && frozen[1] > 0.9 * frozen[0],
         format!("V frozen: errors {}, order 0", listed(frozen)),
     );
-    case.prevents(moved.iter().all(|error| *error < 1e-6), format!("V follows div v, omega is the invariant: errors {}", listed(moved)));
+    case.prevents(
+        moved.iter().all(|error| *error < 1e-6),
+        format!("V follows div v, omega is the invariant: errors {}", listed(moved)),
+    );
     let lattice = Particles::lattice([0.0], [TAU], [64])?.with_equal_volumes(0.9 * TAU)?;
     let wrong = SetQuality::measure(&lattice, &ring::domain()?, Cutoff(0.4))?.volume_defect.unwrap_or(0.0);
     case.reports(
         defects.iter().all(|defect| defect.abs() < 1e-3) && (wrong + 0.1).abs() < 1e-12,
         format!("sum V against the box: {} (and {wrong:.2} for volumes a tenth too small)", listed(defects)),
     );
-    case.documents(include_str!("../../../src/solver/lagrangian.rs"), "The strengths omega_p are what is conserved; the values u_p are never stored.");
+    case.documents(
+        include_str!("../../../src/solver/lagrangian.rs"),
+        "The strengths omega_p are what is conserved; the values u_p are never stored.",
+    );
     Ok(())
 }

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use parops::{
-    AdvectionDiffusion, Carried, Domain, Lagrangian, Lambda, Mesh, MeshKernel, MovingScene, MovingState, Particles, Remeshing,
-    Result, Rk4, Steady, Trigger,
+    AdvectionDiffusion, Carried, Domain, Lagrangian, Lambda, Mesh, MeshKernel, MovingScene, MovingState, Particles,
+    Remeshing, Result, Rk4, Steady, Trigger,
 };
 
 pub fn domain() -> Result<Domain<1>> {

@@ -61,5 +61,9 @@ pub fn order(coarse: f64, fine: f64, ratio: f64) -> f64 {
 
 /// Numbers as text, for a line of a case.
 pub fn listed(numbers: impl IntoIterator<Item = f64>) -> String {
-    numbers.into_iter().map(|x| if x.abs() < 1e-2 || x.abs() >= 1e4 { format!("{x:.2e}") } else { format!("{x:.3}") }).collect::<Vec<_>>().join(", ")
+    numbers
+        .into_iter()
+        .map(|x| if x.abs() < 1e-2 || x.abs() >= 1e4 { format!("{x:.2e}") } else { format!("{x:.3}") })
+        .collect::<Vec<_>>()
+        .join(", ")
 }
