@@ -95,7 +95,7 @@ pub fn advection(case: &mut Case, quick: bool) -> Done {
     );
     // The fastest mode comes to dominate, from below.
     case.reports(
-        rate.is_some_and(|rate| (0.5..1.1).contains(&(measured / rate))),
+        rate.is_some_and(|rate| (0.5..1.25).contains(&(measured / rate))),
         format!(
             "{}; {:.2} of that rate was measured",
             refusal.map_or(String::from("accepted"), |error| error.to_string()),
