@@ -26,29 +26,44 @@ impl<'a, const D: usize, M: Method<D>, P: Neighbors<D>> MatrixFree<'a, D, M, P> 
     /// # Errors
     /// As [`Rows::assemble`](super::Rows::assemble).
     pub fn new(method: &'a M, neighbors: &'a P) -> Result<Self> {
-        let mut operator = Self { method, neighbors, report: Report::default(), workers: Workers::new() };
-        let targets = neighbors.targets();
-        method.validate(targets, neighbors.sources())?;
-        let blocks = (0..targets).step_by(BLOCK).map(|first| first..targets.min(first + BLOCK));
-        let reports = each_block(blocks, |rows| {
-            operator.workers.with(method, |worker| {
-                let mut report = Report::default();
-                for first in rows.clone().step_by(BATCH) {
-                    for draft in worker.rows(method, neighbors, first..rows.end.min(first + BATCH))? {
-                        report.add(&draft.report.clone()?);
-                    }
-                }
-                Ok(report)
-            })
-        })?;
-        reports.iter().for_each(|block| operator.report.merge(block));
-        operator.report.accept()?;
+        let mut operator = Self::unchecked(method, neighbors);
+        operator.check(&mut vec![(); neighbors.targets()], |_, _| ())?;
         Ok(operator)
     }
 
     /// The same without a check, for rows that are checked another time.
     pub(crate) fn unchecked(method: &'a M, neighbors: &'a P) -> Self {
         Self { method, neighbors, report: Report::default(), workers: Workers::new() }
+    }
+
+    /// Checks every row and hands each to `row`, which gives its result.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub(crate) fn check<T: Send>(
+        &mut self,
+        out: &mut [T],
+        row: impl Fn(usize, &Draft<D, M::Out>) -> T + Sync + Send,
+    ) -> Result<()> {
+        let Self { method, neighbors, workers, .. } = &*self;
+        method.validate(neighbors.targets(), neighbors.sources())?;
+        let blocks = out.chunks_mut(BLOCK).enumerate().map(|(b, out)| (b * BLOCK, out));
+        let reports = each_block(blocks, |(first, out)| {
+            workers.with(method, |worker| {
+                let mut report = Report::default();
+                for (batch, out) in (first..).step_by(BATCH).zip(out.chunks_mut(BATCH)) {
+                    let drafts = worker.rows(method, *neighbors, batch..batch + out.len())?;
+                    for ((p, out), draft) in (batch..).zip(out).zip(drafts) {
+                        report.add(&draft.report.clone()?);
+                        *out = row(p, draft);
+                    }
+                }
+                Ok(report)
+            })
+        })?;
+        self.report = Report::default();
+        reports.iter().for_each(|block| self.report.merge(block));
+        self.report.accept()
     }
 
     /// What the check of all rows found.

@@ -1,4 +1,11 @@
 //! Householder QR of the windowed Vandermonde matrix: the conditions without squaring their condition number.
+//!
+//! Windows let the rows of B span many decades, and only with the heavy rows first is QR exact row by row.
+//!
+//! Source: A. J. Cox and N. J. Higham, Stability of Householder QR factorization for weighted least squares problems,
+//! 1998, sec. 3.
+
+use std::cmp::Ordering;
 
 use super::solver::{MomentScratch, MomentSolver, Rung, Solution, condition, worst};
 use super::system::{MomentSystem, Residual};
@@ -43,9 +50,13 @@ fn solve<T: Scalar, const D: usize>(
     pivot: bool,
 ) -> Result<Solution<T>> {
     let (n, l) = (system.neighbors(), system.conditions());
-    let MomentScratch { matrix, diagonal, factors, order, a, b, y, .. } = scratch;
+    let MomentScratch { matrix, diagonal, factors, order, rows, a, b, y, .. } = scratch;
+    rows.clear();
+    rows.extend(0..n);
+    let roots = system.roots();
+    rows.sort_unstable_by(|&p, &q| roots[q].partial_cmp(&roots[p]).unwrap_or(Ordering::Equal).then(p.cmp(&q)));
     matrix.clear();
-    matrix.extend_from_slice(system.columns());
+    system.columns().chunks_exact(n.max(1)).for_each(|column| matrix.extend(rows.iter().map(|&p| column[p])));
     let rank = factorize(matrix, n, l, diagonal, factors, order, pivot);
     let singular = OperatorError::Singular { neighbors: n, conditions: l, rank };
     if rank == 0 || (!pivot && rank < l) {
@@ -75,8 +86,11 @@ fn solve<T: Scalar, const D: usize>(
         for j in (0..rank).rev() {
             reflect(&matrix[j * n + j..(j + 1) * n], factors[j], &mut y[j..]);
         }
-        residual = worst(residual, system.residual(k, y));
-        system.window_into(y, w);
+        b.clear();
+        b.resize(n, T::zero());
+        rows.iter().zip(&*y).for_each(|(&p, &y)| b[p] = y);
+        residual = worst(residual, system.residual(k, b));
+        system.window_into(b, w);
     }
     Ok(Solution { rung: if pivot { Rung::PivotedQr } else { Rung::Qr }, rank, condition, residual })
 }

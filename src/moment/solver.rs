@@ -41,6 +41,7 @@ pub struct MomentScratch<T> {
     pub(super) diagonal: Vec<T>,
     pub(super) factors: Vec<T>,
     pub(super) order: Vec<usize>,
+    pub(super) rows: Vec<usize>,
     pub(super) a: Vec<T>,
     pub(super) b: Vec<T>,
     pub(super) y: Vec<T>,

@@ -129,6 +129,11 @@ impl<T: Scalar, const D: usize> MomentSystem<T, D> {
         }
     }
 
+    /// The diagonal of E: the square root of the window at each neighbor.
+    pub(super) fn roots(&self) -> &[T] {
+        &self.roots
+    }
+
     /// Column j of the scaled B.
     pub(super) fn column(&self, j: usize) -> &[T] {
         &self.columns[j * self.n..][..self.n]

@@ -11,7 +11,6 @@ use crate::error::{ErrorKind, KernelError, OperatorError, Result};
 use crate::kernel::along_axis;
 use crate::moment::{Ladder, MomentScratch, MomentSolver, MomentSystem, Solution};
 use crate::multi_index::Term;
-use crate::scalar::square;
 use crate::scale::{Cutoff, Epsilon, Volumes};
 use crate::stencil::{Side, Stencil};
 
@@ -142,8 +141,6 @@ impl<const D: usize> Closure<D> {
         if neighbors < conditions {
             return Err(OperatorError::TooFew { neighbors, conditions, needed: conditions }.into());
         }
-        // The weights of the window span many decades: only with the heavy rows first is QR exact row by row.
-        nodes.sort_unstable_by(|&a, &b| square(&half.z[a]).total_cmp(&square(&half.z[b])).then(a.cmp(&b)));
         z.clear();
         z.extend(nodes.iter().map(|&q| half.z[q]));
         w.clear();

@@ -17,7 +17,7 @@ use crate::time::Entry;
 /// let u = [1.0_f32, -2.0];
 /// assert_eq!((<[f32; 2]>::FIELDS, u.get(1)), (2, -2.0));
 /// ```
-pub trait Fields: Entry {
+pub trait Fields: Entry + PartialEq {
     /// The number type of the fields, and of the weights that act on them.
     type Scalar: Field;
 

@@ -347,8 +347,8 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
 
     /// One step of the stepper, volumes and places checked.
     fn substep(&mut self, work: &mut MovingState<D, S::Value>, t: f64, dt: f64) -> Result<()> {
-        let Self { moving, stepper, .. } = self;
-        stepper.step(t, dt, work, &mut |t, state, rates| moving.rate(t, state, rates))?;
+        let Self { moving, stepper, state: checked, .. } = self;
+        stepper.step(t, dt, work, &mut |t, state, rates| moving.rate(t, state, checked, rates))?;
         if let Some((p, &volume)) = work.1.1.iter().enumerate().find(|(_, volume)| !(**volume > 0.0)) {
             return Err(crate::error::Error::from(SolverError::Volume { volume, t: t + dt }).at(p));
         }

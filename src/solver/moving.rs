@@ -63,6 +63,9 @@ pub(super) struct Moving<const D: usize, S: MovingScene<D>> {
     volume: Vec<f64>,
     u: Vec<S::Value>,
     places: Vec<[f64; D]>,
+    /// div(D grad u) as the last check found it, and its time; no time once it was used.
+    spread: Vec<S::Value>,
+    spread_at: Option<f64>,
 }
 
 impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
@@ -100,6 +103,8 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
             volume: Vec::new(),
             u: Vec::new(),
             places: Vec::new(),
+            spread: Vec::new(),
+            spread_at: None,
         };
         let state = moving.take(points, omega, volume);
         Ok((moving, state))
@@ -213,13 +218,16 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         self.u = u;
     }
 
-    /// dx/dt = v, dV/dt = V div v, domega/dt = V div(D grad u) + V S.
+    /// dx/dt = v, dV/dt = V div v, domega/dt = V div(D grad u) + V S; what the check of the rows at `checked` found for
+    /// this time and state is not computed again.
     pub(super) fn rate(
         &mut self,
         t: f64,
         state: &MovingState<D, S::Value>,
+        checked: &MovingState<D, S::Value>,
         rates: &mut MovingState<D, S::Value>,
     ) -> Result<()> {
+        let known = self.spread_at.take() == Some(t) && state == checked;
         self.place(t, state)?;
         if Self::EXCHANGES {
             self.evaluate(state);
@@ -238,7 +246,11 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
                 let rate = source.rate(&(), p, &points[p], t, u, rate);
                 S::Value::ZERO.plus(volume[p], rate)
             };
-            self.scene.diffusion_term().rates(&self.kept, &self.site, u, domega, finish)?;
+            if known {
+                each_row(domega, |p| finish(p, self.spread[p]));
+            } else {
+                self.scene.diffusion_term().rates(&self.kept, &self.site, u, domega, finish)?;
+            }
         }
         Ok(())
     }
@@ -250,9 +262,15 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         state: &MovingState<D, S::Value>,
         courant: f64,
     ) -> Result<(Limits, Option<Report>)> {
+        self.spread_at = None;
         self.place(t, state)?;
+        if Self::EXCHANGES {
+            self.evaluate(state);
+        }
         let mut limits = Limits::default();
-        let checked = self.scene.diffusion_term().check(&self.kept, &self.site)?;
+        self.spread.resize(self.u.len(), S::Value::ZERO);
+        let checked = self.scene.diffusion_term().check(&self.kept, &self.site, &self.u, &mut self.spread)?;
+        self.spread_at = checked.is_some().then_some(t);
         if let Some((report, factor)) = &checked {
             limits.add(Limit::Diffusion, Rate::decay(factor * report.spectral_bound));
         }
@@ -263,7 +281,6 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
             limits.set(Limit::Compression, Rate::default());
         }
         if <S::Source as SceneTerm<D, S::Value>>::PRESENT {
-            self.evaluate(state);
             self.scene.source_term().limit(&mut (), &self.site, t, &self.u, &mut limits)?;
         }
         Ok((limits, checked.map(|(report, _)| report)))

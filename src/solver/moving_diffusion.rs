@@ -11,7 +11,7 @@ use crate::domain::{Domain, Face};
 use crate::error::{ParticleError, Result};
 use crate::linear::{Spectrum, SpectrumEstimator};
 use crate::neighbors::{Neighbors, VerletList};
-use crate::operator::{DivGrad, Method};
+use crate::operator::{DivGrad, Draft, Method};
 use crate::particles::Particles;
 use crate::scalar::Scalar;
 use crate::scale::{Cutoff, Spacing};
@@ -76,12 +76,12 @@ pub trait MovingDiffusion<const D: usize, E: Fields>: Sync {
     /// As [`MovingMethod::admits`].
     fn admits(&self, kept: &Self::Kept, spacing: Spacing) -> Result<()>;
 
-    /// Checks all rows of now; `None` where there are none. The eigenvalues of the term are bounded by the spectral bound
-    /// of the report times the number beside it.
+    /// Checks all rows of now and writes div(D grad u), which costs little once rows are there; `None` where there are
+    /// none. The eigenvalues of the term are bounded by the spectral bound of the report times the number beside it.
     ///
     /// # Errors
     /// Naming the particle whose row is illegal.
-    fn check(&self, kept: &Self::Kept, site: &Site<D>) -> Result<Option<(Report, f64)>>;
+    fn check(&self, kept: &Self::Kept, site: &Site<D>, u: &[E], out: &mut [E]) -> Result<Option<(Report, f64)>>;
 
     /// The rightmost eigenvalue and the spectral radius of the rows of now; zero without a product where no weight is
     /// negative.
@@ -139,7 +139,7 @@ impl<const D: usize, E: Fields> MovingDiffusion<D, E> for () {
         Ok(())
     }
 
-    fn check(&self, (): &(), _: &Site<D>) -> Result<Option<(Report, f64)>> {
+    fn check(&self, (): &(), _: &Site<D>, _: &[E], _: &mut [E]) -> Result<Option<(Report, f64)>> {
         Ok(None)
     }
 
@@ -242,14 +242,14 @@ impl<C: Diffusivity<D>, M: MovingMethod<D>, const D: usize, E: Fields> MovingDif
         self.method.admits(spacing, Cutoff(kept.cutoff))
     }
 
-    fn check(&self, kept: &MovingRows<D, M>, site: &Site<D>) -> Result<Option<(Report, f64)>> {
+    fn check(&self, kept: &MovingRows<D, M>, site: &Site<D>, u: &[E], out: &mut [E]) -> Result<Option<(Report, f64)>> {
         let within = kept.within();
         let (report, factor) = match self.diffusivity.constant() {
-            Some(factor) => (*MatrixFree::new(&kept.method, &within)?.report(), factor),
+            Some(factor) => (check(&kept.method, &within, factor, u, out)?, factor),
             None => {
                 let values = diffusivities(&self.diffusivity, site.points())?;
                 let method = DivGrad::new(kept.method.clone(), values)?.mean(self.mean);
-                (*MatrixFree::new(&method, &within)?.report(), 1.0)
+                (check(&method, &within, 1.0, u, out)?, 1.0)
             }
         };
         check_contrast(&report)?;
@@ -311,6 +311,19 @@ fn spectrum<const D: usize, M: Method<D, Out = [f64; 1]>>(
     })
 }
 
+/// The report of all rows, and factor sum_q w_pq (u_q - u_p) of each.
+fn check<const D: usize, M: Method<D, Out = [f64; 1]>, E: Fields>(
+    method: &M,
+    neighbors: &Within<'_, D>,
+    factor: f64,
+    u: &[E],
+    out: &mut [E],
+) -> Result<Report> {
+    let mut rows = MatrixFree::unchecked(method, neighbors);
+    rows.check(out, |p, draft| rate(draft, factor, u, p))?;
+    Ok(*rows.report())
+}
+
 /// `finish`(p, factor sum_q w_pq (u_q - u_p)), row after row, without storing any.
 fn sweep<const D: usize, M: Method<D, Out = [f64; 1]>, E: Fields>(
     method: &M,
@@ -320,15 +333,18 @@ fn sweep<const D: usize, M: Method<D, Out = [f64; 1]>, E: Fields>(
     out: &mut [E],
     finish: impl Fn(usize, E) -> E + Sync + Send,
 ) -> Result<()> {
-    let factor = E::Scalar::lift(factor);
-    MatrixFree::unchecked(method, neighbors).each(out, |p, draft| {
-        let (own, [diagonal]) = (u[p], draft.diagonal);
-        let mut sum = E::ZERO.plus_product(E::Scalar::lift(diagonal), own);
-        for (&q, &[w]) in draft.stencil.sources().iter().zip(&draft.weights) {
-            sum = sum.plus_difference(E::Scalar::lift(w), u[q as usize], own);
-        }
-        finish(p, E::ZERO.plus_product(factor, sum))
-    })
+    MatrixFree::unchecked(method, neighbors).each(out, |p, draft| finish(p, rate(draft, factor, u, p)))
+}
+
+/// factor sum_q w_pq (u_q - u_p) of one row.
+#[inline]
+fn rate<const D: usize, E: Fields>(draft: &Draft<D, [f64; 1]>, factor: f64, u: &[E], p: usize) -> E {
+    let (own, [diagonal]) = (u[p], draft.diagonal);
+    let mut sum = E::ZERO.plus_product(E::Scalar::lift(diagonal), own);
+    for (&q, &[w]) in draft.stencil.sources().iter().zip(&draft.weights) {
+        sum = sum.plus_difference(E::Scalar::lift(w), u[q as usize], own);
+    }
+    E::ZERO.plus_product(E::Scalar::lift(factor), sum)
 }
 
 /// A list whose rows stay within a cutoff below its reach, so that rows that are refused can grow.

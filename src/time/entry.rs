@@ -102,7 +102,8 @@ impl<E: Entry + nalgebra::Scalar, const K: usize> Entry for SVector<E, K> {
     }
 }
 
-/// How many entries are tested for finiteness before the first branch, so that the test is a vector loop.
+/// How many entries are tested for finiteness before the first branch, so that the test is a vector loop; few enough to
+/// stay in the innermost cache.
 const BLOCK: usize = 256;
 
 /// x_p = base_p + a y_p.
@@ -119,6 +120,28 @@ pub(super) fn add<E: Entry>(x: &mut [E], a: f64, y: &[E]) {
     for (x, &y) in x.iter_mut().zip(y) {
         *x = x.plus(a, y);
     }
+}
+
+/// x_p = base_p + a y_p and sum_p += b y_p, block by block, so that a block of y comes from memory once; or the first
+/// entry of y that is not finite.
+#[inline]
+pub(super) fn set_sum_and_add<E: Entry>(
+    x: &mut [E],
+    base: &[E],
+    a: f64,
+    y: &[E],
+    sum: &mut [E],
+    b: f64,
+) -> Option<usize> {
+    let blocks = x.chunks_mut(BLOCK).zip(base.chunks(BLOCK)).zip(y.chunks(BLOCK)).zip(sum.chunks_mut(BLOCK));
+    for (block, (((x, base), y), sum)) in blocks.enumerate() {
+        if let Some(i) = first_non_finite(y) {
+            return Some(block * BLOCK + i);
+        }
+        set_sum(x, base, a, y);
+        add(sum, b, y);
+    }
+    None
 }
 
 /// The first entry with a number that is not finite.

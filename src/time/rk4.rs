@@ -1,7 +1,7 @@
 //! The classical Runge-Kutta scheme of order 4.
 
 use super::state::State;
-use super::stepper::{Rhs, Stepper, check_finite, check_step, evaluate, scratch};
+use super::stepper::{Rhs, Stepper, check_finite, check_step, evaluate, evaluate_shape, refuse_not_finite, scratch};
 use crate::error::Result;
 
 /// End of the negative real interval of RK4: the root of 1 + z/2 + z^2/6 + z^3/24 = 0, z = -2.785...
@@ -21,15 +21,15 @@ pub struct Rk4<S> {
     #[cfg_attr(feature = "serde", serde(skip))]
     k: Option<S>,
     #[cfg_attr(feature = "serde", serde(skip))]
-    stage: Option<S>,
+    sum: Option<S>,
     #[cfg_attr(feature = "serde", serde(skip))]
-    next: Option<S>,
+    stage: Option<S>,
 }
 
 impl<S> Rk4<S> {
     /// RK4 without working memory yet.
     pub const fn new() -> Self {
-        Self { k: None, stage: None, next: None }
+        Self { k: None, sum: None, stage: None }
     }
 }
 
@@ -55,25 +55,22 @@ impl<S: State> Stepper<S> for Rk4<S> {
     fn step(&mut self, t: f64, dt: f64, u: &mut S, rhs: &mut Rhs<'_, S>) -> Result<()> {
         check_step(t, dt)?;
         check_finite(u, 1, t)?;
-        let (k, stage, next) = (scratch(&mut self.k, u), scratch(&mut self.stage, u), scratch(&mut self.next, u));
+        let (k, sum, stage) = (scratch(&mut self.k, u), scratch(&mut self.sum, u), scratch(&mut self.stage, u));
         let (half, middle, end) = (dt / 2.0, t + dt / 2.0, t + dt);
 
-        evaluate(rhs, 1, t, u, k)?;
-        next.set_sum(u, dt / 6.0, k);
-        stage.set_sum(u, half, k);
+        evaluate(rhs, 1, t, u, sum)?;
+        stage.set_sum(u, half, sum);
 
-        evaluate(rhs, 2, middle, stage, k)?;
-        next.add_scaled(dt / 3.0, k);
-        stage.set_sum(u, half, k);
-
-        evaluate(rhs, 3, middle, stage, k)?;
-        next.add_scaled(dt / 3.0, k);
-        stage.set_sum(u, dt, k);
+        for (n, length) in [(2, half), (3, dt)] {
+            evaluate_shape(rhs, middle, stage, k)?;
+            refuse_not_finite(stage.set_sum_and_add(u, length, k, sum, 2.0), n, middle)?;
+        }
 
         evaluate(rhs, 4, end, stage, k)?;
-        next.add_scaled(dt / 6.0, k);
-        check_finite(next, 5, end)?;
-        std::mem::swap(u, next);
+        sum.add_scaled(1.0, k);
+        stage.set_sum(u, dt / 6.0, sum);
+        check_finite(stage, 5, end)?;
+        std::mem::swap(u, stage);
         Ok(())
     }
 }

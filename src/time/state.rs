@@ -39,6 +39,17 @@ pub trait State: Clone {
     /// self = self + a y.
     fn add_scaled(&mut self, a: f64, y: &Self);
 
+    /// self = base + a y and sum = sum + b y in one pass over y, unless y is not finite: then its first particle with a
+    /// number which is not, and what self and sum hold is unspecified.
+    fn set_sum_and_add(&mut self, base: &Self, a: f64, y: &Self, sum: &mut Self, b: f64) -> Option<usize> {
+        let found = y.first_non_finite();
+        if found.is_none() {
+            self.set_sum(base, a, y);
+            sum.add_scaled(b, y);
+        }
+        found
+    }
+
     /// The first particle that has a number which is not finite.
     fn first_non_finite(&self) -> Option<usize>;
 
@@ -68,6 +79,10 @@ macro_rules! state_by_slice {
             #[inline]
             fn add_scaled(&mut self, a: f64, y: &Self) {
                 entry::add($mut_slice(self), a, $slice(y));
+            }
+
+            fn set_sum_and_add(&mut self, base: &Self, a: f64, y: &Self, sum: &mut Self, b: f64) -> Option<usize> {
+                entry::set_sum_and_add($mut_slice(self), $slice(base), a, $slice(y), $mut_slice(sum), b)
             }
 
             fn first_non_finite(&self) -> Option<usize> {
@@ -107,6 +122,12 @@ impl<A: State, B: State> State for (A, B) {
     fn add_scaled(&mut self, a: f64, y: &Self) {
         self.0.add_scaled(a, &y.0);
         self.1.add_scaled(a, &y.1);
+    }
+
+    fn set_sum_and_add(&mut self, base: &Self, a: f64, y: &Self, sum: &mut Self, b: f64) -> Option<usize> {
+        let first = self.0.set_sum_and_add(&base.0, a, &y.0, &mut sum.0, b);
+        let second = self.1.set_sum_and_add(&base.1, a, &y.1, &mut sum.1, b);
+        first.into_iter().chain(second).min()
     }
 
     fn first_non_finite(&self) -> Option<usize> {

@@ -100,17 +100,24 @@ pub(super) fn check_step(t: f64, dt: f64) -> Result<()> {
 
 /// Refuses a state that is not finite, as stage `stage` at time `t`.
 pub(super) fn check_finite<S: State>(u: &S, stage: usize, t: f64) -> Result<()> {
-    match u.first_non_finite() {
-        None => Ok(()),
-        Some(particle) => Err(Error::from(TimeError::NotFinite { stage, t }).at(particle)),
-    }
+    refuse_not_finite(u.first_non_finite(), stage, t)
+}
+
+/// The error for a particle where something was not finite.
+pub(super) fn refuse_not_finite(particle: Option<usize>, stage: usize, t: f64) -> Result<()> {
+    particle.map_or(Ok(()), |particle| Err(Error::from(TimeError::NotFinite { stage, t }).at(particle)))
 }
 
 /// du = f(t, u) of one stage, checked for shape and finiteness.
 pub(super) fn evaluate<S: State>(rhs: &mut Rhs<'_, S>, stage: usize, t: f64, u: &S, du: &mut S) -> Result<()> {
-    rhs(t, u, du)?;
-    du.same_shape(u)?;
+    evaluate_shape(rhs, t, u, du)?;
     check_finite(du, stage, t)
+}
+
+/// du = f(t, u), checked for shape only.
+pub(super) fn evaluate_shape<S: State>(rhs: &mut Rhs<'_, S>, t: f64, u: &S, du: &mut S) -> Result<()> {
+    rhs(t, u, du)?;
+    du.same_shape(u)
 }
 
 /// The scratch state of a stepper, with the shape of `u`; allocates in the first step only.
