@@ -70,12 +70,11 @@ pub fn least_squares(separations: &[[f64; 2]], beta: [u32; 2], order: u32, h: f6
     let cut = f64::EPSILON * separations.len() as f64 * moments.singular_values().max();
     let weights = moments.clone().svd(true, true).solve(&b, cut).unwrap_or_else(|_| DVector::zeros(separations.len()));
     let degree = (beta[0] + beta[1]) as i32;
-    let miss = (moments * weights - b)
+    (moments * weights - b)
         .iter()
         .zip(&conditions)
         .map(|(miss, alpha)| miss.abs() * h.powi(degree - (alpha[0] + alpha[1]) as i32))
-        .fold(0.0, f64::max);
-    miss
+        .fold(0.0, f64::max)
 }
 
 /// The k nearest of a point, ties in the order of the numbers: as a sort and a cut leave them.

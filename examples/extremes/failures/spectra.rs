@@ -25,7 +25,7 @@ fn largest(u: &[f64]) -> f64 {
 
 /// u' = f(u) by RK4 written out.
 fn rk4(
-    u: &mut Vec<f64>,
+    u: &mut [f64],
     dt: f64,
     steps: usize,
     mut rhs: impl FnMut(&[f64], &mut [f64]) -> parops::Result<()>,
