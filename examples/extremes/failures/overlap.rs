@@ -4,7 +4,7 @@ use std::error::Error;
 use std::f64::consts::TAU;
 
 use parops::{
-    AdvectionDiffusion, Carried, CubicSpline, Cutoff, Domain, ErrorKind, Lagrangian, Lambda, Mesh, MovingScene,
+    AdvectionDiffusion, Carried, CubicSpline, Cutoff, Domain, ErrorKind, Kernel, Lagrangian, Lambda, Mesh, MovingScene,
     Neighbors, OverlapWatch, Particles, Random, Remeshing, Rk4, SetQuality, SmoothingKernel, SolverError, Steady,
     Trigger, WendlandC2, least_gap,
 };
@@ -161,6 +161,11 @@ fn noisy(m: usize, noise: f64) -> parops::Result<Particles<2>> {
     Particles::new(lattice.points().iter().map(moved).collect())?.with_equal_volumes(1.0)
 }
 
+/// The largest usable h/epsilon of a kernel.
+fn limit<const D: usize>(kernel: &impl Kernel<f64, D>) -> f64 {
+    kernel.overlap_limit()
+}
+
 /// 12. Pairs under pressure.
 pub fn pairing(case: &mut Case, quick: bool) -> Done {
     const OVERLAP: f64 = 2.0;
@@ -207,6 +212,15 @@ pub fn pairing(case: &mut Case, quick: bool) -> Done {
         include_str!("../../../src/kernel/wendland.rs"),
         "Positive definite in D dimensions: no pairing for any number of neighbors.",
     );
+    // The table of usable overlap, with the limits that the kernels themselves have.
+    let table = include_str!("../../../src/kernel/mod.rs");
+    let line = |name: &str, limits: [f64; 3], pairs: &str| {
+        format!("| [`{name}`](crate::{name}) | {:.2}, {:.2}, {:.2} | {pairs} |", limits[0], limits[1], limits[2])
+    };
+    let splines = [limit(&CubicSpline::<1>::new()), limit(&CubicSpline::<2>::new()), limit(&CubicSpline::<3>::new())];
+    let wendlands = [limit(&WendlandC2::<1>::new()), limit(&WendlandC2::<2>::new()), limit(&WendlandC2::<3>::new())];
+    case.documents(table, &line("CubicSpline", splines, "0.77"));
+    case.documents(table, &line("WendlandC2", wendlands, "never"));
     Ok(())
 }
 
