@@ -39,7 +39,7 @@ pub struct Axes<'a> {
 }
 
 const SIZE: (u32, u32) = (760, 560);
-const PALETTE: [RGBColor; 8] = [
+const PALETTE: [RGBColor; 10] = [
     RGBColor(31, 87, 166),
     RGBColor(206, 77, 38),
     RGBColor(35, 133, 72),
@@ -48,6 +48,8 @@ const PALETTE: [RGBColor; 8] = [
     RGBColor(178, 130, 0),
     RGBColor(0, 139, 149),
     RGBColor(130, 130, 130),
+    RGBColor(214, 99, 168),
+    RGBColor(128, 84, 60),
 ];
 
 /// Draws panels side by side into one SVG file.
@@ -138,23 +140,30 @@ where
         return Ok(());
     }
     let (columns, rows) = chart.plotting_area().get_pixel_range();
-    let middle = ((columns.start + columns.end) / 2, (rows.start + rows.end) / 2);
     let drawn: Vec<(i32, i32)> = curves
         .iter()
         .flat_map(|curve| dense(&curve.points, axes.logarithmic))
         .map(|p| chart.backend_coord(&p))
         .collect();
-    // The corner that fewest points share with the legend.
-    let hidden = |&(_, left, low): &(SeriesLabelPosition, bool, bool)| {
-        drawn.iter().filter(|p| (p.0 < middle.0) == left && (p.1 > middle.1) == low).count()
-    };
-    let corners = [
-        (SeriesLabelPosition::LowerLeft, true, true),
-        (SeriesLabelPosition::UpperRight, false, false),
-        (SeriesLabelPosition::LowerRight, false, true),
-        (SeriesLabelPosition::UpperLeft, true, false),
+    // About what the legend takes.
+    let names = || curves.iter().map(|curve| curve.name.len()).filter(|&length| length > 0);
+    let size = (70 + 8 * names().max().unwrap_or(0) as i32, 20 + 20 * names().count() as i32);
+    let (right, low) = (columns.end - size.0, rows.end - size.1);
+    let middle = (rows.start + rows.end - size.1) / 2;
+    let places = [
+        (SeriesLabelPosition::LowerLeft, columns.start, low),
+        (SeriesLabelPosition::UpperRight, right, rows.start),
+        (SeriesLabelPosition::LowerRight, right, low),
+        (SeriesLabelPosition::UpperLeft, columns.start, rows.start),
+        (SeriesLabelPosition::MiddleLeft, columns.start, middle),
+        (SeriesLabelPosition::MiddleRight, right, middle),
     ];
-    let position = corners.into_iter().min_by_key(hidden).map_or(SeriesLabelPosition::UpperRight, |corner| corner.0);
+    // The place where it hides least.
+    let hidden = |&(_, left, top): &(SeriesLabelPosition, i32, i32)| {
+        let under = |p: &&(i32, i32)| (left..left + size.0).contains(&p.0) && (top..top + size.1).contains(&p.1);
+        drawn.iter().filter(under).count()
+    };
+    let position = places.into_iter().min_by_key(hidden).map_or(SeriesLabelPosition::UpperRight, |place| place.0);
     chart
         .configure_series_labels()
         .position(position)
@@ -198,7 +207,17 @@ fn bounds(curves: &[Curve], logarithmic: bool, coordinate: impl Fn(&(f64, f64)) 
         return (0.1, 1.0);
     }
     if logarithmic {
-        (low / 1.6, high * 1.6)
+        let (low, high) = (low / 1.6, high * 1.6);
+        // An axis without a power of ten would have no label.
+        let (below, above) = (10.0_f64.powf(low.log10().floor()), 10.0_f64.powf(high.log10().ceil()));
+        let bare = below * 10.0 > high;
+        if !bare {
+            (low, high)
+        } else if low / below < above / high {
+            (0.999 * below, high)
+        } else {
+            (low, 1.001 * above)
+        }
     } else {
         let margin = 0.05 * (high - low).max(f64::MIN_POSITIVE);
         (low - margin, high + margin)

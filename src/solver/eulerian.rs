@@ -41,6 +41,9 @@ pub struct Eulerian<const D: usize, S: Scene<D>, St> {
     discrete: SemiDiscrete<D, S>,
     stepper: St,
     steps: StepPolicy,
+    growth: GrowthPolicy,
+    /// The rate of the advection that growth was estimated at.
+    estimated: f64,
     sharp: Vec<(Limit, Rate)>,
     ledger: LedgerRow<D>,
     /// Masses at the start, once there is one.
@@ -74,23 +77,20 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     ) -> Result<Self> {
         let mut discrete = SemiDiscrete::new(scene, particles, neighbors, growth)?;
         let mut ledger = LedgerRow::new(S::Value::FIELDS);
-        if growth != GrowthPolicy::Unknown {
-            let spectrum = discrete.spectrum(0.0)?;
-            ledger.growth = match growth {
-                GrowthPolicy::Allow => spectrum.abscissa,
-                _ => SemiDiscrete::<D, S>::check_growth(&spectrum)?,
-            };
-        }
+        ledger.growth = discrete.growth(0.0, growth)?;
         for report in discrete.reports() {
             ledger.condition = ledger.condition.max(report.condition);
             ledger.residual = ledger.residual.max(report.residual);
         }
+        // What the source adds shows before the first step: it may not be defined without a field.
+        let limits = discrete.linear_limits(0.0)?;
         if steps != StepPolicy::Allow {
-            // What the source adds shows before the first step: it may not be defined without a field.
-            discrete.linear_limits(0.0)?.possible_within(|limit| stepper.intervals(limit))?;
+            limits.possible_within(|limit| stepper.intervals(limit))?;
             stepper.check_symmetry(discrete.symmetry())?;
         }
-        Ok(Self { discrete, stepper, steps, sharp: Vec::new(), ledger, start: Vec::new(), t: 0.0, work: Vec::new() })
+        let (estimated, sharp) = (limits.rate(Limit::Advection).fastest(), Vec::new());
+        let (start, t, work) = (Vec::new(), 0.0, Vec::new());
+        Ok(Self { discrete, stepper, steps, growth, estimated, sharp, ledger, start, t, work })
     }
 
     /// Sets what happens to a step above the limit.
@@ -127,6 +127,15 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     /// The time the run is at.
     pub fn time(&self) -> f64 {
         self.t
+    }
+
+    /// The longest legal step from here: infinite without a limit.
+    ///
+    /// # Errors
+    /// As [`limits`](Self::limits).
+    pub fn longest_step(&mut self, u: &[S::Value]) -> Result<f64> {
+        let limits = self.limits(u)?;
+        Ok(self.bound(&limits).0)
     }
 
     /// The ledger after the last step.
@@ -170,15 +179,19 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     /// # Errors
     /// As [`SemiDiscrete::limits`]; [`TimeError::Shape`] for another number of particles.
     pub fn limits(&mut self, u: &[S::Value]) -> Result<Limits> {
-        self.limits_at(self.t, u)
+        self.limits_of(self.t, 0.0, u)
     }
 
-    fn limits_at(&mut self, t: f64, u: &[S::Value]) -> Result<Limits> {
+    /// What bounds a step from t over dt: the larger rates of its ends, of a source that at t.
+    fn limits_of(&mut self, t: f64, dt: f64, u: &[S::Value]) -> Result<Limits> {
         let (found, needed) = (u.len(), self.discrete.site().points().len());
         if found != needed {
             return Err(TimeError::Shape { found, needed }.into());
         }
         let mut limits = self.discrete.limits(t, u)?;
+        if dt > 0.0 && !self.discrete.steady() {
+            limits = limits.larger(&self.discrete.linear_limits(t + dt)?);
+        }
         self.sharp.iter().for_each(|&(limit, rate)| limits.set(limit, rate));
         Ok(limits)
     }
@@ -224,16 +237,14 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(TimeError::Step { dt }.into());
         }
-        let limits = self.limits_at(self.t, u)?;
+        let limits = self.limits_of(self.t, dt, u)?;
         let (limit, binding) = self.bound(&limits);
         let within = dt <= limit;
         if !within && self.steps == StepPolicy::Refuse {
             return Err(limits.refuse(dt, limit, binding));
         }
-        if self.start.is_empty() {
-            self.ledger.measure(self.discrete.site().particles(), u, &[]);
-            self.start.extend(self.ledger.fields.iter().map(|field| field.mass));
-        }
+        let (growth, estimated) = self.estimate(&limits, dt)?;
+        let start = if self.start.is_empty() { Some(self.masses(u)) } else { None };
         let whole = within || self.steps == StepPolicy::Allow;
         let in_place = !<S::Edge as Edge<D, S::Value>>::PRESENT && self.ledger.budget == f64::INFINITY;
         let substeps = if whole && in_place {
@@ -254,14 +265,33 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
             self.work = work;
             done?
         };
-        self.t = end;
+        (self.t, self.estimated) = (end, estimated);
+        self.start.extend(start.into_iter().flatten());
         let ledger = &mut self.ledger;
+        ledger.growth = growth;
         ledger.measure(self.discrete.site().particles(), u, &self.start);
         (ledger.t, ledger.dt, ledger.limit, ledger.binding) = (end, dt, limit, binding);
         (ledger.within_limit, ledger.substeps) = (within || substeps > 1, substeps);
         ledger.step += 1;
         ledger.retries += u64::from(substeps) - 1;
         Ok(&self.ledger)
+    }
+
+    /// The mass of every field.
+    fn masses(&self, u: &[S::Value]) -> Vec<f64> {
+        let mut row = LedgerRow::new(S::Value::FIELDS);
+        row.measure(self.discrete.site().particles(), u, &[]);
+        row.fields.iter().map(|field| field.mass).collect()
+    }
+
+    /// The growth rate of modes and the rate of the advection it was estimated at: anew where the flow has become twice as
+    /// fast, at the end of the step where it is at rest before.
+    fn estimate(&mut self, limits: &Limits, dt: f64) -> Result<(f64, f64)> {
+        let rate = limits.rate(Limit::Advection).fastest();
+        if self.discrete.steady() || !(rate > 2.0 * self.estimated) {
+            return Ok((self.ledger.growth, self.estimated));
+        }
+        Ok((self.discrete.growth(self.t + dt, self.growth)?, rate))
     }
 
     /// The longest legal step, and what binds it.
@@ -304,7 +334,7 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
                 return Ok(done);
             }
             t += rest / parts;
-            limits = self.limits_at(t, u)?;
+            limits = self.limits_of(t, end - t, u)?;
         }
     }
 }

@@ -163,7 +163,7 @@ struct Gradients<'a, V, const D: usize> {
 impl<'a, V: Velocity<D>, const D: usize> Gradients<'a, V, D> {
     fn new(velocity: &'a V, site: &'a Site<D>, domain: &Domain<D>, t: f64) -> Result<Self> {
         let mut gradients = Self { velocity, site, t, made: Vec::new() };
-        if site.points().is_empty() || gradients.at(0).is_some() {
+        if V::EVERYWHERE || site.points().is_empty() {
             return Ok(gradients);
         }
         let method = DcPse::<Gradient<D>, 2>::new();
@@ -190,7 +190,7 @@ impl<'a, V: Velocity<D>, const D: usize> Gradients<'a, V, D> {
         let volume = self.site.particles().volumes().ok()?.get(p).ok()?;
         // The error of a central difference, step^2 and eps/step, is least here.
         let step = f64::EPSILON.cbrt() * (magnitude + volume.powf(1.0 / D as f64));
-        self.velocity.gradient(p, x, self.t, step)
+        Some(self.velocity.gradient(p, x, self.t, step))
     }
 }
 

@@ -17,7 +17,7 @@ use crate::kernel::MeshKernel;
 use crate::mesh::Remeshed;
 use crate::particles::Particles;
 use crate::scale::Volumes;
-use crate::time::{Entry, Plan, Stepper};
+use crate::time::{Entry, Plan, State, Stepper};
 
 /// The default constant C of the Lagrangian CFL condition dt |grad v|_2 <= C.
 pub const COURANT: f64 = 0.5;
@@ -96,7 +96,7 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
         settings: MovingSettings,
     ) -> Result<Self> {
         let (mut moving, state) = Moving::new(scene, particles, u, domain, settings)?;
-        let (limits, report) = moving.limits(0.0, &state, COURANT)?;
+        let (limits, report) = moving.limits(0.0, 0.0, &state, COURANT)?;
         limits.possible(&stepper)?;
         if report.is_some() {
             stepper.check_symmetry(moving.symmetry(&state)?)?;
@@ -236,10 +236,7 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
     /// # Errors
     /// Naming the particle where a coefficient is not finite or a row is illegal.
     pub fn limits(&mut self) -> Result<Limits> {
-        let Self { moving, state, t, .. } = self;
-        let (mut limits, _) = moving.limits(*t, state, self.courant)?;
-        self.sharp.iter().for_each(|&(limit, rate)| limits.set(limit, rate));
-        Ok(limits)
+        Ok(self.limits_of(self.t, 0.0, None)?.0)
     }
 
     /// Advances the run by one step, and replaces the particles where it is time.
@@ -285,14 +282,15 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(TimeError::Step { dt }.into());
         }
-        let (limits, report) = self.limits_of(self.t, None)?;
+        let (limits, report) = self.limits_of(self.t, dt, None)?;
         let (limit, binding) = (limits.step(&self.stepper), limits.binding(&self.stepper));
         let within = dt <= limit;
         if !within && self.policy == StepPolicy::Refuse {
             return Err(limits.refuse(dt, limit, binding));
         }
         let mut work = std::mem::take(&mut self.work);
-        work.clone_from(&self.state);
+        // A clone of a pair would allocate.
+        work.assign(&self.state);
         let whole = within || self.policy == StepPolicy::Allow;
         let t = self.t;
         let done =
@@ -338,9 +336,15 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
         Ok(&self.ledger)
     }
 
-    /// What bounds a step from a state at time t, by default that of the run, and what the check of the rows found.
-    fn limits_of(&mut self, t: f64, state: Option<&MovingState<D, S::Value>>) -> Result<(Limits, Option<Report>)> {
-        let (mut limits, report) = self.moving.limits(t, state.unwrap_or(&self.state), self.courant)?;
+    /// What bounds a step of length dt from a state at time t, by default that of the run, and what the check of the rows
+    /// found.
+    fn limits_of(
+        &mut self,
+        t: f64,
+        dt: f64,
+        state: Option<&MovingState<D, S::Value>>,
+    ) -> Result<(Limits, Option<Report>)> {
+        let (mut limits, report) = self.moving.limits(t, dt, state.unwrap_or(&self.state), self.courant)?;
         self.sharp.iter().for_each(|&(limit, rate)| limits.set(limit, rate));
         Ok((limits, report))
     }
@@ -376,7 +380,7 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
                 return Ok(done);
             }
             t += rest / parts;
-            limits = self.limits_of(t, Some(work))?.0;
+            limits = self.limits_of(t, end - t, Some(work))?.0;
         }
     }
 
@@ -394,7 +398,7 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
                 self.moving.place(t, work)?;
                 overlap_is_lost(remesher.mesh(), self.moving.site.particles(), &self.moving.domain, hole, gap)?
             }
-            Trigger::Condition(limit) => match self.moving.limits(t, work, self.courant) {
+            Trigger::Condition(limit) => match self.moving.limits(t, 0.0, work, self.courant) {
                 Ok((_, report)) => report.is_some_and(|report| report.condition > limit),
                 // Rows that are refused are worse than those that are not.
                 Err(error) if matches!(error.kind(), crate::error::ErrorKind::Operator(_)) => true,

@@ -3,6 +3,7 @@
 use super::coefficient::{Diffusivity, diffusivities};
 use super::diffusion::{Diffusion, check_contrast};
 use super::fields::Fields;
+use super::growth::legal;
 use super::policy::GrowthPolicy;
 use super::term::Site;
 use crate::apply::blocks::each_row;
@@ -301,7 +302,7 @@ fn spectrum<const D: usize, M: Method<D, Out = [f64; 1]>>(
     factor: f64,
 ) -> Result<Spectrum> {
     let rows = Rows::<[f64; 1]>::assemble(method, neighbors)?;
-    if rows.report().negative_weights == 0 {
+    if rows.cannot_grow(legal::<f64>()) {
         return Ok(Spectrum::default());
     }
     SpectrumEstimator::new().most(MOST).estimate(neighbors.targets(), |u, du| {

@@ -18,6 +18,9 @@ pub enum Trigger {
     /// When overlap is lost: as soon as the largest hole ([`fill_distance`]) is wider than `hole` or the least gap
     /// ([`least_gap`]) narrower than `gap`, both in spacings of the mesh. A fresh mesh has a hole of sqrt(D)/2 and a gap of
     /// 1; the number of neighbors shows neither.
+    ///
+    /// It keeps a set fit for its operators. It does not converge: between two remeshings particles are distorted by as
+    /// much whatever h, and the field they deposit misses by as much. Orders need remeshing after a fixed number of steps.
     Overlap {
         /// The largest legal hole, above sqrt(D)/2.
         hole: f64,

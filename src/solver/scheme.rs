@@ -113,23 +113,24 @@ impl<S: Scene<D, Value = E>, E: Fields, const D: usize> TimeScheme<D, S> for Imp
     }
 
     fn step(&mut self, t: f64, dt: f64, u: &mut Vec<E>, discrete: &mut SemiDiscrete<D, S>) -> Result<()> {
-        let at = t + self.theta * dt;
+        // Inflow may begin or end within a step: it is taken where the step ends.
+        let (at, end) = (t + self.theta * dt, t + dt);
         let mut implicit = match self.held.take() {
             Some(implicit) if discrete.steady() => implicit,
             Some(mut implicit) => {
-                implicit.set_matrix(discrete.matrix(at)?)?;
-                implicit.algebraic(discrete.prescribed(t + dt))?
+                implicit.set_matrix(discrete.matrix_with(at, end, |_| 0.0)?)?;
+                implicit.algebraic(discrete.prescribed(end))?
             }
             None => {
-                let matrix = discrete.matrix(at)?;
+                let matrix = discrete.matrix_with(at, end, |_| 0.0)?;
                 let scheme =
                     if self.theta == 1.0 { Implicit::euler(matrix)? } else { Implicit::crank_nicolson(matrix)? };
-                scheme.algebraic(discrete.prescribed(t + dt))?
+                scheme.algebraic(discrete.prescribed(end))?
             }
         };
         self.before.clone_from(u);
         let before = &self.before;
-        let done = implicit.step(t, dt, u, &mut |t, g| discrete.load(t, before, g));
+        let done = implicit.step(t, dt, u, &mut |t, g| discrete.load_with(t, end, before, g));
         self.held = Some(implicit);
         done.map(|_| ())
     }

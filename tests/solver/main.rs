@@ -3,6 +3,7 @@
 mod eulerian;
 mod eulerian_faults;
 mod eulerian_ledger;
+mod eulerian_limits;
 mod eulerian_order;
 mod eulerian_schemes;
 mod eulerian_stiff;
