@@ -136,7 +136,7 @@ impl Limits {
     pub fn larger(&self, other: &Self) -> Self {
         let mut rates = self.rates;
         rates.iter_mut().zip(&other.rates).for_each(|(own, other)| *own = own.larger(*other));
-        Self { rates }
+        Self { rates, setters: self.setters }
     }
 
     /// The rate of one kind.
