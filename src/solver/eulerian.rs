@@ -256,7 +256,8 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
             work.clone_from(u);
             let done =
                 if whole { self.substep(&mut work, self.t, dt).map(|()| 1) } else { self.cut(&mut work, dt, limits) };
-            let done = done.and_then(|substeps| self.drifted(&work).map(|()| substeps));
+            let done = done
+                .and_then(|substeps| self.drifted(&work, start.as_deref().unwrap_or(&self.start)).map(|()| substeps));
             if done.is_ok() {
                 std::mem::swap(u, &mut work);
             } else {
@@ -300,13 +301,13 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         (limits.step_within(intervals), limits.binding_within(intervals))
     }
 
-    /// Refuses a field that has drifted by more than the budget.
-    fn drifted(&self, u: &[S::Value]) -> Result<()> {
+    /// Refuses a field that has drifted from the masses at the start by more than the budget.
+    fn drifted(&self, u: &[S::Value], start: &[f64]) -> Result<()> {
         let particles = self.discrete.site().particles();
         let volumes = particles.volumes().ok();
         let volume = |p: usize| volumes.and_then(|volumes| volumes.get(p).ok()).unwrap_or(1.0);
         let strength = |p: usize, i: usize| u.get(p).map_or(0.0, |u| volume(p) * u.get(i));
-        check_drift::<D, S::Value>(particles.points(), strength, &self.start, self.ledger.budget)
+        check_drift::<D, S::Value>(particles.points(), strength, start, self.ledger.budget)
     }
 
     /// One substep of a scene, boundary values included.

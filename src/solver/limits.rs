@@ -48,6 +48,11 @@ impl Rate {
         self.decay.max(self.oscillation).max(self.modulus)
     }
 
+    /// The largest number in it.
+    fn most(self) -> f64 {
+        self.fastest().max(self.frequency)
+    }
+
     /// The larger of each.
     #[must_use]
     pub fn larger(self, other: Self) -> Self {
@@ -103,8 +108,7 @@ impl Limits {
 
     /// The same for a rate that one particle sets; it is named where that rate is the largest of its kind.
     pub fn add_of(&mut self, limit: Limit, rate: Rate, particle: Option<usize>) {
-        let most = |rate: Rate| rate.decay.max(rate.oscillation).max(rate.modulus).max(rate.frequency);
-        if most(rate) > most(self.rate(limit)) {
+        if rate.most() > self.rate(limit).most() {
             self.setters[limit as usize] = particle;
         }
         self.add(limit, rate);
@@ -134,9 +138,14 @@ impl Limits {
     /// The larger rates, kind by kind.
     #[must_use]
     pub fn larger(&self, other: &Self) -> Self {
-        let mut rates = self.rates;
-        rates.iter_mut().zip(&other.rates).for_each(|(own, other)| *own = own.larger(*other));
-        Self { rates, setters: self.setters }
+        let mut all = *self;
+        for (i, rate) in other.rates.iter().enumerate() {
+            if rate.most() > all.rates[i].most() {
+                all.setters[i] = other.setters[i];
+            }
+            all.rates[i] = all.rates[i].larger(*rate);
+        }
+        all
     }
 
     /// The rate of one kind.
