@@ -81,8 +81,9 @@ pub use multi_index::*;
 #[cfg(feature = "kiddo")]
 pub use neighbors::KdTree;
 pub use neighbors::{
-    BruteForce, Canonical, CellList, HalfList, Nearest, NeighborList, Neighbors, Pair, Selected, Symmetry, Upstream,
-    VerletList, epsilon_from_neighbors, fill_distance, least_gap, mean_neighbor_distance, volumes_from_neighbors,
+    BruteForce, Canonical, CellList, HalfList, Nearest, NeighborList, Neighbors, Pair, Selected, SetQuality, Symmetry,
+    Upstream, VerletList, epsilon_from_neighbors, fill_distance, least_gap, mean_neighbor_distance,
+    volumes_from_neighbors,
 };
 pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};

@@ -9,6 +9,7 @@ use super::saved::SavedRun;
 use super::scene::Scene;
 use super::scheme::TimeScheme;
 use super::semi_discrete::SemiDiscrete;
+use super::watch::{check_budget, check_drift};
 use crate::error::{Limit, Result, SolverError, TimeError};
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
@@ -106,6 +107,16 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         self
     }
 
+    /// Refuses steps after which the mass of a field has drifted by more than this share of sum_p |omega_p|, such as 1e-3:
+    /// methods that are exact on scattered particles do not conserve. What sources and boundaries add counts as drift.
+    ///
+    /// # Errors
+    /// [`SolverError::Budget`] where it is not positive.
+    pub fn drift_budget(mut self, budget: f64) -> Result<Self> {
+        self.ledger.budget = check_budget(budget)?;
+        Ok(self)
+    }
+
     /// Sets the time the run is at.
     #[must_use]
     pub fn at(mut self, t: f64) -> Self {
@@ -194,7 +205,7 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     ///
     /// # Errors
     /// [`SolverError::Limit`] for a step above the limit, [`SolverError::Substeps`] where cutting it does not help;
-    /// [`TimeError::NotFinite`] with particle, stage and time; as [`TimeScheme::step`] and [`SemiDiscrete::rate`]. Field and
+    /// [`SolverError::Drift`] above the [`drift_budget`](Self::drift_budget); [`TimeError::NotFinite`] with particle, stage and time; as [`TimeScheme::step`] and [`SemiDiscrete::rate`]. Field and
     /// run are then as they were.
     pub fn step(&mut self, u: &mut Vec<S::Value>, dt: f64) -> Result<&LedgerRow<D>> {
         self.step_to(u, dt, self.t + dt)
@@ -235,12 +246,13 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         let (limit, binding) = self.bound(&limits);
         let within = dt <= limit;
         if !within && self.steps == StepPolicy::Refuse {
-            return Err(SolverError::Limit { dt, limit, binding: binding.unwrap_or(Limit::Diffusion) }.into());
+            return Err(limits.refuse(dt, limit, binding));
         }
         let (growth, estimated) = self.estimate(&limits, dt)?;
         let start = if self.start.is_empty() { Some(self.masses(u)) } else { None };
         let whole = within || self.steps == StepPolicy::Allow;
-        let substeps = if whole && !<S::Edge as Edge<D, S::Value>>::PRESENT {
+        let in_place = !<S::Edge as Edge<D, S::Value>>::PRESENT && self.ledger.budget == f64::INFINITY;
+        let substeps = if whole && in_place {
             let Self { discrete, stepper, t, .. } = self;
             stepper.step(*t, dt, u, discrete)?;
             1
@@ -249,6 +261,8 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
             work.clone_from(u);
             let done =
                 if whole { self.substep(&mut work, self.t, dt).map(|()| 1) } else { self.cut(&mut work, dt, limits) };
+            let done = done
+                .and_then(|substeps| self.drifted(&work, start.as_deref().unwrap_or(&self.start)).map(|()| substeps));
             if done.is_ok() {
                 std::mem::swap(u, &mut work);
             } else {
@@ -290,6 +304,15 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     fn bound(&self, limits: &Limits) -> (f64, Option<Limit>) {
         let intervals = |limit| self.stepper.intervals(limit);
         (limits.step_within(intervals), limits.binding_within(intervals))
+    }
+
+    /// Refuses a field that has drifted from the masses at the start by more than the budget.
+    fn drifted(&self, u: &[S::Value], start: &[f64]) -> Result<()> {
+        let particles = self.discrete.site().particles();
+        let volumes = particles.volumes().ok();
+        let volume = |p: usize| volumes.and_then(|volumes| volumes.get(p).ok()).unwrap_or(1.0);
+        let strength = |p: usize, i: usize| u.get(p).map_or(0.0, |u| volume(p) * u.get(i));
+        check_drift::<D, S::Value>(particles.points(), strength, start, self.ledger.budget)
     }
 
     /// One substep of a scene, boundary values included.

@@ -124,7 +124,7 @@ impl<V: Velocity<D>, X: Sync, W: FlowDivergence<D>, const D: usize> Flow<D> for 
         courant: f64,
         limits: &mut Limits,
     ) -> Result<()> {
-        let (mut distortion, mut compression) = (0.0_f64, 0.0_f64);
+        let (mut distortion, mut compression) = ((0.0, None), (0.0, None));
         let gradients = Gradients::new(&self.velocity, site, domain, t)?;
         for (p, x) in site.points().iter().enumerate() {
             let v = self.velocity.at(p, x, t);
@@ -139,10 +139,15 @@ impl<V: Velocity<D>, X: Sync, W: FlowDivergence<D>, const D: usize> Flow<D> for 
             if !divergence.is_finite() {
                 return Err(Error::from(SolverError::Divergence { value: divergence, t }).at(p));
             }
-            (distortion, compression) = (distortion.max(value), compression.max(divergence));
+            if value > distortion.0 {
+                distortion = (value, Some(p));
+            }
+            if divergence > compression.0 {
+                compression = (divergence, Some(p));
+            }
         }
-        limits.add(Limit::Distortion, Rate::frequency(distortion / courant));
-        limits.add(Limit::Compression, Rate::decay(compression));
+        limits.add_of(Limit::Distortion, Rate::frequency(distortion.0 / courant), distortion.1);
+        limits.add_of(Limit::Compression, Rate::decay(compression.0), compression.1);
         Ok(())
     }
 }

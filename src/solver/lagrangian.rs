@@ -9,6 +9,7 @@ use super::moving_diffusion::{MovingDiffusion, MovingSettings};
 use super::policy::{GrowthPolicy, StepPolicy};
 use super::remeshing::{Nodes, Remesher, Remeshing, Trigger, check, overlap_is_lost};
 use super::semi_discrete::SemiDiscrete;
+use super::watch::OverlapWatch;
 use crate::apply::Report;
 use crate::domain::Domain;
 use crate::error::{ErrorKind, Limit, LinearError, Result, SolverError, TimeError};
@@ -68,6 +69,7 @@ pub struct Lagrangian<const D: usize, S: MovingScene<D>, St> {
     pub(super) surveyed: u64,
     sharp: Vec<(Limit, Rate)>,
     remesher: Option<Box<dyn Remesher<D, S::Value>>>,
+    pub(super) watch: Option<OverlapWatch<D>>,
     pub(super) ledger: LedgerRow<D>,
     /// Masses at the start.
     pub(super) start: Vec<f64>,
@@ -118,6 +120,7 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
             surveyed: 0,
             sharp: Vec::new(),
             remesher: None,
+            watch: None,
             ledger: LedgerRow::new(S::Value::FIELDS),
             start: Vec::new(),
             t: 0.0,
@@ -246,7 +249,8 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
     ///
     /// # Errors
     /// [`SolverError::Limit`] for a step above the limit, [`SolverError::Substeps`] where cutting it does not help;
-    /// [`SolverError::Volume`] naming the particle whose volume would not stay positive;
+    /// [`SolverError::Volume`] naming the particle whose volume would not stay positive; [`SolverError::OverlapLost`] where it
+    /// is [watched](Self::watching); [`SolverError::Drift`] above the [`drift_budget`](Self::drift_budget);
     /// [`DomainError::Outside`](crate::DomainError::Outside) naming one that leaves the domain, and
     /// [`MeshError::Support`](crate::MeshError::Support) one whose support leaves the mesh; as [`Stepper::step`],
     /// [`MovingDiffusion::check`] and [`MovingDiffusion::rates`]. The run is then as it was.
@@ -288,7 +292,7 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
         let (limit, binding) = (limits.step(&self.stepper), limits.binding(&self.stepper));
         let within = dt <= limit;
         if !within && self.policy == StepPolicy::Refuse {
-            return Err(SolverError::Limit { dt, limit, binding: binding.unwrap_or(Limit::Diffusion) }.into());
+            return Err(limits.refuse(dt, limit, binding));
         }
         let searches = self.moving.searches().0;
         let growth = match report {
@@ -306,8 +310,12 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
         let t = self.t;
         let done =
             if whole { self.substep(&mut work, t, dt).map(|()| 1) } else { self.cut(&mut work, dt, end, limits) };
-        let done = done.and_then(|substeps| Ok((substeps, self.remeshed(&work, end)?)));
-        let (substeps, remeshed) = match done {
+        let done = done.and_then(|substeps| {
+            let remeshed = self.remeshed(&work, end)?;
+            let overlap = self.watched(&work, end, remeshed.as_ref().map(|(fresh, _)| fresh))?;
+            Ok((substeps, remeshed, overlap))
+        });
+        let (substeps, remeshed, overlap) = match done {
             Ok(done) => done,
             Err(error) => {
                 self.work = work;
@@ -333,6 +341,9 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
             }
         }
         self.t = end;
+        if let Some(overlap) = overlap {
+            (self.ledger.hole, self.ledger.gap) = overlap;
+        }
         self.certify(report.as_ref());
         self.measure();
         let ledger = &mut self.ledger;

@@ -1,6 +1,6 @@
 //! What bounds the next step, term by term.
 
-use crate::error::{Limit, Result, SolverError};
+use crate::error::{Error, Limit, Result, SolverError};
 use crate::time::{State, Stepper};
 
 /// How fast the modes of one term decay and oscillate, and the longest step it bears whatever the stepper.
@@ -48,6 +48,11 @@ impl Rate {
         self.decay.max(self.oscillation).max(self.modulus)
     }
 
+    /// The largest number in it.
+    fn most(self) -> f64 {
+        self.fastest().max(self.frequency)
+    }
+
     /// The larger of each.
     #[must_use]
     pub fn larger(self, other: Self) -> Self {
@@ -87,6 +92,8 @@ impl Rate {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Limits {
     rates: [Rate; Limit::ALL.len()],
+    /// Who sets them, where that is one particle.
+    setters: [Option<usize>; Limit::ALL.len()],
 }
 
 impl Limits {
@@ -99,17 +106,46 @@ impl Limits {
         own.frequency = larger(own.frequency, rate.frequency);
     }
 
+    /// The same for a rate that one particle sets; it is named where that rate is the largest of its kind.
+    pub fn add_of(&mut self, limit: Limit, rate: Rate, particle: Option<usize>) {
+        if rate.most() > self.rate(limit).most() {
+            self.setters[limit as usize] = particle;
+        }
+        self.add(limit, rate);
+    }
+
     /// Puts a rate in the place of what was known, such as a sharp eigenvalue in that of a bound.
     pub fn set(&mut self, limit: Limit, rate: Rate) {
         self.rates[limit as usize] = rate;
+        self.setters[limit as usize] = None;
+    }
+
+    /// The particle that sets the rate of one kind, where it is known: that of distortion, compression and source.
+    pub fn particle(&self, limit: Limit) -> Option<usize> {
+        self.setters[limit as usize]
+    }
+
+    /// The refusal of a step, naming the particle that sets the limit where it is known.
+    pub(super) fn refuse(&self, dt: f64, limit: f64, binding: Option<Limit>) -> Error {
+        let binding = binding.unwrap_or(Limit::Diffusion);
+        let error = Error::from(SolverError::Limit { dt, limit, binding });
+        match self.particle(binding) {
+            Some(p) => error.at(p),
+            None => error,
+        }
     }
 
     /// The larger rates, kind by kind.
     #[must_use]
     pub fn larger(&self, other: &Self) -> Self {
-        let mut rates = self.rates;
-        rates.iter_mut().zip(&other.rates).for_each(|(own, other)| *own = own.larger(*other));
-        Self { rates }
+        let mut all = *self;
+        for (i, rate) in other.rates.iter().enumerate() {
+            if rate.most() > all.rates[i].most() {
+                all.setters[i] = other.setters[i];
+            }
+            all.rates[i] = all.rates[i].larger(*rate);
+        }
+        all
     }
 
     /// The rate of one kind.
@@ -146,11 +182,11 @@ impl Limits {
     /// Refuses a step above the limit.
     ///
     /// # Errors
-    /// [`SolverError::Limit`] with the limit and what binds it.
+    /// [`SolverError::Limit`] with the limit and what binds it, naming the particle that sets it where it is known.
     pub fn check<S: State>(&self, dt: f64, stepper: &(impl Stepper<S> + ?Sized)) -> Result<()> {
         let limit = self.step(stepper);
         match self.binding(stepper) {
-            Some(binding) if !(dt <= limit) => Err(SolverError::Limit { dt, limit, binding }.into()),
+            Some(binding) if !(dt <= limit) => Err(self.refuse(dt, limit, Some(binding))),
             _ => Ok(()),
         }
     }

@@ -40,6 +40,7 @@ mod term;
 mod transport;
 mod upwind;
 mod upwind_dcpse;
+mod watch;
 
 pub use advection::{Advection, AdvectionRows};
 pub use carried::{Carried, CarriedRows};
@@ -69,3 +70,4 @@ pub use term::{SceneTerm, Site};
 pub use transport::{Transport, TransportRows};
 pub use upwind::OneSidedRows;
 pub use upwind_dcpse::UpwindDcPseRows;
+pub use watch::OverlapWatch;

@@ -137,14 +137,30 @@ pub(super) fn overlap_is_lost<const D: usize>(
     hole: f64,
     gap: f64,
 ) -> Result<bool> {
-    let (least, widest) = mesh.spacings().iter().fold((f64::INFINITY, 0.0_f64), |(l, w), &h| (l.min(h), w.max(h)));
+    let (least, widest) = spacings(mesh);
     if least_gap(&CellList::build(particles, domain, Cutoff(gap * least))?) < gap * least {
         return Ok(true);
     }
+    Ok(hole_of(mesh, particles, domain, hole)? > hole * widest)
+}
+
+/// The smallest and the largest spacing of a mesh.
+pub(super) fn spacings<const D: usize>(mesh: &Mesh<D>) -> (f64, f64) {
+    mesh.spacings().iter().fold((f64::INFINITY, 0.0_f64), |(l, w), &h| (l.min(h), w.max(h)))
+}
+
+/// The largest hole, seen from the nodes of a mesh and the middles of its cells, as long as it is not above three times
+/// `hole` spacings.
+pub(super) fn hole_of<const D: usize>(
+    mesh: &Mesh<D>,
+    particles: &Particles<D>,
+    domain: &Domain<D>,
+    hole: f64,
+) -> Result<f64> {
     let half = mesh.spacings().map(|h| 0.5 * h);
     let middle = |x: [f64; D]| std::array::from_fn(|axis| x[axis] + half[axis]);
     let inside = |x: [f64; D]| domain.wrap(&x).ok();
     let probes: Vec<[f64; D]> = mesh.points().flat_map(|x| [x, middle(x)]).filter_map(inside).collect();
-    let sight = Cutoff(SIGHT * hole * widest);
-    Ok(fill_distance(&CellList::build_at(&probes, particles, domain, sight)?) > hole * widest)
+    let sight = Cutoff(SIGHT * hole * spacings(mesh).1);
+    Ok(fill_distance(&CellList::build_at(&probes, particles, domain, sight)?))
 }

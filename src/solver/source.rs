@@ -32,13 +32,16 @@ impl<F: Fn(&[f64; D], f64, E) -> E + Sync, const D: usize, E: Fields> SceneTerm<
     }
 
     fn limit(&self, (): &mut (), site: &Site<D>, t: f64, u: &[E], limits: &mut Limits) -> Result<()> {
-        let (mut fastest, scale) = (0.0_f64, difference(u));
+        let (mut fastest, scale) = ((0.0, None), difference(u));
         for (p, x) in site.free() {
             let Some(&u) = u.get(p) else { break };
-            fastest = fastest.max(decay(&self.0, x, t, u, scale).map_err(|error| error.at(p))?);
+            let decay = decay(&self.0, x, t, u, scale).map_err(|error| error.at(p))?;
+            if decay > fastest.0 {
+                fastest = (decay, Some(p));
+            }
         }
-        let rate = if E::FIELDS == 1 { Rate::decay(fastest) } else { Rate::modulus(fastest) };
-        limits.add(Limit::Source, rate);
+        let rate = if E::FIELDS == 1 { Rate::decay(fastest.0) } else { Rate::modulus(fastest.0) };
+        limits.add_of(Limit::Source, rate, fastest.1);
         Ok(())
     }
 

@@ -18,3 +18,4 @@ mod resume;
 mod scene;
 mod sharp_limits;
 mod steady;
+mod watch;
