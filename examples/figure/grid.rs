@@ -10,8 +10,11 @@ use crate::figure::{Axes, Curve, legend, panel_of};
 const PANEL: (u32, u32) = (440, 370);
 /// Axes this long have labels at powers of ten alone, which do not touch.
 const SPAN: f64 = 300.0;
-/// Width and height of an entry of the legend.
+/// Least width, and height, of an entry of the legend.
 const ENTRY: (u32, u32) = (220, 24);
+/// Widths of a letter, and of the mark with its margins.
+const LETTER: u32 = 8;
+const BESIDE: u32 = 48;
 
 /// Draws logarithmic panels, row after row, and below them an entry for each name among their curves: those of one name
 /// are to look alike.
@@ -37,7 +40,9 @@ fn drawing<'a>(
     }
     let rows = panels.len().div_ceil(columns);
     let width = PANEL.0 * columns as u32;
-    let across = (width / ENTRY.0).max(1) as usize;
+    let longest = entries.iter().map(|entry| entry.0.len() as u32).max().unwrap_or(0);
+    let each = ENTRY.0.max(LETTER * longest + BESIDE);
+    let across = (width / each).max(1) as usize;
     let strip = ENTRY.1 * entries.len().div_ceil(across) as u32 + 20;
     let root = SVGBackend::with_string(svg, (width, PANEL.1 * rows as u32 + strip)).into_drawing_area();
     root.fill(&WHITE)?;
@@ -46,7 +51,7 @@ fn drawing<'a>(
         panel_of(&area, axes, curves, SPAN)?;
     }
     for (i, (name, mark, color)) in entries.into_iter().enumerate() {
-        let (x, y) = ((i % across) as i32 * ENTRY.0 as i32 + 24, (i / across) as i32 * ENTRY.1 as i32 + 14);
+        let (x, y) = ((i % across) as i32 * each as i32 + 24, (i / across) as i32 * ENTRY.1 as i32 + 14);
         lower.draw(&legend(x, y, mark, crate::figure::color(color)))?;
         lower.draw(&Text::new(name, (x + 32, y - 7), ("sans-serif", 15)))?;
     }

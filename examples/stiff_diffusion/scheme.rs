@@ -56,7 +56,8 @@ impl Scheme {
         }
     }
 
-    fn implicit(self) -> Option<ImplicitScheme> {
+    /// The scheme, where it is implicit.
+    pub fn implicit(self) -> Option<ImplicitScheme> {
         match self {
             Self::ImplicitEulerLu => Some(ImplicitScheme::euler().lu_up_to(usize::MAX)),
             Self::ImplicitEulerBiCgStab => Some(ImplicitScheme::euler().lu_up_to(0)),
@@ -67,7 +68,7 @@ impl Scheme {
     }
 
     /// The stepper for steps of dt, and the right-hand sides it evaluates a step.
-    fn explicit<M: Method<2, Out = [f64; 1]> + Clone>(
+    pub fn explicit<M: Method<2, Out = [f64; 1]> + Clone>(
         self,
         setting: &Setting<M>,
         dt: f64,

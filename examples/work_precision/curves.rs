@@ -22,8 +22,11 @@ pub fn draw(path: &Path, table: &Table, scene: &str) -> Result<(), Box<dyn Error
     let methods = distinct(of_scene().map(|sample| sample.method.clone()));
     let steppers = distinct(of_scene().map(|sample| sample.stepper.clone()).filter(|stepper| !stepper.is_empty()));
     let crowded = steppers.len() > 1 && tasks.iter().any(|task| task.series().len() > CROWD);
+    // More methods than marks are told apart by colors too.
+    let many = methods.len() > MARKS.len();
     let kind = |sample: &Sample| {
-        let Sample { order, stepper, scalar, .. } = sample;
+        let Sample { method, order, stepper, scalar, .. } = sample;
+        let order = if many { format!("{method} {order}") } else { order.to_string() };
         if crowded { format!("{order} {scalar}") } else { format!("{order} {stepper} {scalar}") }
     };
     let kinds = distinct(of_scene().map(kind));

@@ -27,7 +27,15 @@ mod operators;
 mod overlap;
 #[path = "../lecture_diffusion/random_walk.rs"]
 mod random_walk;
+mod remeshing;
+#[allow(dead_code, reason = "records are those of the example stiff_diffusion")]
+#[path = "../stiff_diffusion/scheme.rs"]
+mod scheme;
 mod sets;
+#[allow(dead_code, reason = "errors are those of the samples")]
+#[path = "../stiff_diffusion/setting.rs"]
+mod setting;
+mod stiff;
 
 use std::error::Error;
 use std::fs::{self, File};
@@ -41,8 +49,13 @@ use parops::report::{Page, machine};
 
 type Scene = fn(&mut Bench) -> Result<(), Box<dyn Error>>;
 
-const SCENES: &[(&str, Scene)] =
-    &[("derivatives", derivatives::run), ("lecture", lecture::run), ("overlap", overlap::run)];
+const SCENES: &[(&str, Scene)] = &[
+    ("derivatives", derivatives::run),
+    ("lecture", lecture::run),
+    ("overlap", overlap::run),
+    ("stiff", stiff::run),
+    ("remeshing", remeshing::run),
+];
 
 fn main() -> ExitCode {
     match work_precision() {
