@@ -250,7 +250,7 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
             if known {
                 each_row(domega, |p| finish(p, self.spread[p]));
             } else {
-                self.scene.diffusion_term().rates(&self.kept, &self.site, u, domega, finish)?;
+                self.scene.diffusion_term().rates(&self.kept, u, domega, finish)?;
             }
         }
         Ok(())
@@ -272,7 +272,7 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         }
         let mut limits = Limits::default();
         self.spread.resize(self.u.len(), S::Value::ZERO);
-        let checked = self.scene.diffusion_term().check(&self.kept, &self.site, &self.u, &mut self.spread)?;
+        let checked = self.scene.diffusion_term().check(&self.kept, &self.u, &mut self.spread)?;
         self.spread_at = checked.is_some().then_some(t);
         if let Some((report, factor)) = &checked {
             limits.add(Limit::Diffusion, Rate::decay(factor * report.spectral_bound));
@@ -296,7 +296,7 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
 
     /// The rightmost eigenvalue and the spectral radius of the diffusion rows of now, in so many products each.
     pub(super) fn spectrum(&self, products: usize) -> Result<Spectrum> {
-        self.scene.diffusion_term().spectrum(&self.kept, &self.site, products)
+        self.scene.diffusion_term().spectrum(&self.kept, products)
     }
 
     /// Whether V_p w_pq = V_q w_qp in the rows of now, found by applying them to two fields.
@@ -304,7 +304,7 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         let fields = probes::<S::Value>(self.site.points().len());
         let mut images = fields.clone();
         for (u, image) in fields.iter().zip(&mut images) {
-            self.scene.diffusion_term().rates(&self.kept, &self.site, u, image, |_, rate| rate)?;
+            self.scene.diffusion_term().rates(&self.kept, u, image, |_, rate| rate)?;
         }
         let volumes = self.volume(state);
         Ok(symmetry(&fields, &images, |p| volumes.get(p).copied().unwrap_or(1.0)))
