@@ -376,6 +376,11 @@ fn lagrangian_steps_that_keep_their_neighbors_allocate_nothing() -> parops::Resu
     let pse = Pse::new(Laplacian::<2>, 2, set.spacing()?.epsilon(1.0)?, set.volumes()?)?.support(3.0)?;
     let pse = pse.allow(Allowance::Everywhere);
     assert_eq!(count(scene().advection(shear, Carried).diffusion(1e-3, pse), &set, &torus)?, 0);
+    let spring = Steady(|x: &[f64; 2]| [0.1 * (std::f64::consts::TAU * x[0]).sin(), 0.0]);
+    let spread = |x: &[f64; 2], _: f64| 0.1 * std::f64::consts::TAU * (std::f64::consts::TAU * x[0]).cos();
+    let carried = || scene().advection(spring, Carried).divergence(spread).source(|_: &[f64; 2], _: f64, u: f64| -u);
+    assert_eq!(count(carried(), &set, &torus)?, 0);
+    assert_eq!(count(carried().diffusion(1e-3, dcpse()), &set, &torus)?, 0);
     let rising = |x: &[f64; 2]| 1e-3 * (1.0 + x[0]);
     assert_eq!(count(scene().advection(shear, Carried).diffusion(rising, dcpse()), &set, &torus)?, 0);
     Ok(())

@@ -64,6 +64,7 @@ pub(super) struct Moving<const D: usize, S: MovingScene<D>> {
     volume: Vec<f64>,
     u: Vec<S::Value>,
     places: Vec<[f64; D]>,
+    spare: Volumes,
     /// div(D grad u) as the last check found it, and its time; no time once it was used.
     spread: Vec<S::Value>,
     spread_at: Option<f64>,
@@ -104,6 +105,7 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
             volume: Vec::new(),
             u: Vec::new(),
             places: Vec::new(),
+            spare: Volumes::equal(1.0)?,
             spread: Vec::new(),
             spread_at: None,
         };
@@ -200,7 +202,9 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
             self.site.particles_mut().set_points(&self.places)?;
         }
         if !S::Advection::SOLENOIDAL {
-            let volumes = Volumes::each(state.1.1.clone())?;
+            // The diffusion term shares the volumes of before until it follows; those before them are free.
+            let mut volumes = std::mem::replace(&mut self.spare, self.site.particles().volumes()?.clone());
+            volumes.renew(&state.1.1)?;
             self.site.particles_mut().set_volumes(volumes)?;
         }
         self.scene.advection_term().renew(&mut self.values, &self.site, &self.domain, t)?;
