@@ -91,6 +91,7 @@ pub use solver::*;
 pub use stencil::{Neighbor, Side, Stencil};
 pub use time::*;
 
+pub mod guide;
 #[cfg(feature = "testing")]
 pub mod testing;
 
