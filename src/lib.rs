@@ -33,7 +33,8 @@
 //! `kiddo`: a neighbor provider over an immutable k-d tree.
 //! `rayon`: rows are built and applied by several threads, with the same bits for any number of them.
 //! `serde`: rows and reports saved and read back bit for bit.
-//! `testing`: conformance checkers for kernels, providers, methods and steppers, ours and the user's own.
+//! `testing`: conformance checkers for kernels, providers, methods and steppers, ours and the user's own, and a harness
+//! that puts methods on curves of error against run time.
 
 mod apply;
 mod boundary;
@@ -80,8 +81,9 @@ pub use multi_index::*;
 #[cfg(feature = "kiddo")]
 pub use neighbors::KdTree;
 pub use neighbors::{
-    BruteForce, Canonical, CellList, HalfList, Nearest, NeighborList, Neighbors, Pair, Selected, Symmetry, Upstream,
-    VerletList, epsilon_from_neighbors, fill_distance, least_gap, mean_neighbor_distance, volumes_from_neighbors,
+    BruteForce, Canonical, CellList, HalfList, Nearest, NeighborList, Neighbors, Pair, Selected, SetQuality, Symmetry,
+    Upstream, VerletList, epsilon_from_neighbors, fill_distance, least_gap, mean_neighbor_distance,
+    volumes_from_neighbors,
 };
 pub use operator::*;
 pub use particles::{COORDINATE_HIGH, PARTICLES_HIGH, Particles, Random};
@@ -92,6 +94,8 @@ pub use stencil::{Neighbor, Side, Stencil};
 pub use time::*;
 
 pub mod guide;
+#[cfg(feature = "testing")]
+pub mod report;
 #[cfg(feature = "testing")]
 pub mod testing;
 

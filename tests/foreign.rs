@@ -7,11 +7,12 @@ use parops::testing::{
     check_stepper,
 };
 use parops::{
-    Apply, BruteForce, CellList, CenterTerm, Cutoff, D1, Domain, Epsilon, Error, ErrorKind, Euler, Gradient, Kernel,
-    KernelError, Laplacian, LatticeSpectrum, MatrixFree, Method, MultiIndex, Neighbor, NeighborList, Neighbors,
-    OperatorError, Particles, Plan, Policy, Pse, Result, Rhs, RowReport, Rows, Scalar, SmoothingKernel, Sph, SphForm,
-    State, Stencil, StepLimit, Stepper, Term, TimeError, continuous_moment, discrete_moment, epsilon_from_neighbors,
-    integrate, volumes_from_neighbors,
+    AdvectionDiffusion, Apply, BruteForce, Carried, CellList, CenterTerm, Central, Cutoff, D1, Domain, Epsilon, Error,
+    ErrorKind, Euler, Eulerian, Gradient, Kernel, KernelError, Lagrangian, Laplacian, LatticeSpectrum, Limit,
+    MatrixFree, Method, MultiIndex, Neighbor, NeighborList, Neighbors, OperatorError, Particles, Plan, Policy, Pse,
+    Result, Rhs, RowReport, Rows, Scalar, SmoothingKernel, SolverError, Sph, SphForm, State, Stencil, StepLimit,
+    Stepper, Term, TimeError, continuous_moment, discrete_moment, epsilon_from_neighbors, integrate,
+    volumes_from_neighbors,
 };
 
 fn unit<const D: usize>(axis: usize, degree: u8) -> MultiIndex<D> {
@@ -19,6 +20,7 @@ fn unit<const D: usize>(axis: usize, degree: u8) -> MultiIndex<D> {
 }
 
 /// A foreign exchange kernel of the Laplacian in one dimension: 16 z^4 exp(-z^2) / (15 pi^1/2), M_2 = 2, order 2.
+#[derive(Clone)]
 struct Ring([Term<1>; 1]);
 
 impl Ring {
@@ -183,6 +185,8 @@ fn foreign_smoothing_kernel_serves_sph_and_volumes() -> Result<()> {
 struct Circle {
     count: usize,
     reach: usize,
+    /// The set it is for.
+    generation: u64,
 }
 
 impl Circle {
@@ -213,7 +217,7 @@ impl Neighbors<1> for Circle {
     }
 
     fn generation(&self) -> u64 {
-        0
+        self.generation
     }
 
     fn for_each(&self, p: usize, cutoff: f64, mut visit: impl FnMut(Neighbor<1>)) {
@@ -230,8 +234,8 @@ impl Neighbors<1> for Circle {
 #[test]
 fn foreign_provider_serves_lists_pse_and_sph_stored_and_matrix_free() -> Result<()> {
     // With 64 points every coordinate and distance is exact, so that the oracle has the same bits.
-    let circle = Circle { count: 64, reach: 12 };
     let particles = Particles::lattice([0.0], [1.0], [64])?;
+    let circle = Circle { count: 64, reach: 12, generation: particles.generation() };
     let domain = Domain::periodic([0.0], [1.0])?;
     let oracle = BruteForce::build(&particles, &domain, Cutoff(circle.reach()))?;
     check_provider_against(&circle, &oracle).unwrap();
@@ -256,8 +260,9 @@ fn foreign_provider_serves_lists_pse_and_sph_stored_and_matrix_free() -> Result<
     Ok(())
 }
 
-/// A foreign method: the first derivative as the slope of the least-squares line through the particle, any points.
-struct Slope;
+/// A foreign method: the first derivative as the slope of the least-squares line through the particle, any points within
+/// a cutoff.
+struct Slope(f64);
 
 impl Method<1> for Slope {
     type Out = [f64; 1];
@@ -265,6 +270,10 @@ impl Method<1> for Slope {
 
     fn scratch(&self) -> Result<()> {
         Ok(())
+    }
+
+    fn cutoff(&self, _: usize) -> Result<Option<f64>> {
+        Ok(Some(self.0))
     }
 
     fn weights(&self, row: &Stencil<1>, _: &mut (), w: &mut [[f64; 1]], diagonal: &mut [f64; 1]) -> Result<()> {
@@ -293,10 +302,10 @@ fn foreign_method_runs_through_rows_and_matrix_free_over_the_cell_list() -> Resu
     let particles = Particles::jittered([0.0], [1.0], [64], 0.4, 3)?;
     let mirrors = Domain::new([0.0], [1.0], [[parops::Face::MirrorOdd, parops::Face::MirrorEven]])?;
     let neighbors = CellList::build(&particles, &mirrors, Cutoff(0.04))?;
-    check_method(&Slope, &neighbors).unwrap();
+    check_method(&Slope(0.04), &neighbors).unwrap();
     // Exact for lines on any points; no condition is solved, so that rounding alone is left.
     check_method_moments(
-        &Slope,
+        &Slope(0.04),
         &CellList::build(&particles, &Domain::open(), Cutoff(0.04))?,
         &D1::<1>::default(),
         1,
@@ -304,8 +313,8 @@ fn foreign_method_runs_through_rows_and_matrix_free_over_the_cell_list() -> Resu
     )
     .unwrap();
 
-    let rows: Rows = Rows::assemble(&Slope, &neighbors)?;
-    let free = MatrixFree::new(&Slope, &neighbors)?;
+    let rows: Rows = Rows::assemble(&Slope(0.04), &neighbors)?;
+    let free = MatrixFree::new(&Slope(0.04), &neighbors)?;
     let f: Vec<f64> = particles.points().iter().map(|x| (0.5 * PI * x[0]).sin()).collect();
     let (mut stored, mut again) = (vec![0.0; 64], vec![0.0; 64]);
     rows.apply(&f, &mut stored)?;
@@ -316,56 +325,63 @@ fn foreign_method_runs_through_rows_and_matrix_free_over_the_cell_list() -> Resu
         assert!((slope - 0.5 * PI * (0.5 * PI * x[0]).cos()).abs() < 2.5 * 0.04);
     }
     let points = CellList::build_at(&[[0.5]], &particles, &Domain::open(), Cutoff(0.04))?;
-    let error = Rows::<[f64; 1]>::assemble(&Slope, &points).unwrap_err();
+    let error = Rows::<[f64; 1]>::assemble(&Slope(0.04), &points).unwrap_err();
     assert!(error.particle() == Some(0) && matches!(error.kind(), ErrorKind::Operator(OperatorError::NoCenter { .. })));
     Ok(())
 }
 
-/// A foreign stepper: Heun's method of order 2.
-#[derive(Default)]
-struct Heun {
-    held: Option<[Vec<f64>; 3]>,
+/// A foreign stepper: Heun's method of order 3, of any state.
+struct Heun<S> {
+    held: Option<[S; 3]>,
 }
 
-impl Stepper<Vec<f64>> for Heun {
+impl<S> Default for Heun<S> {
+    fn default() -> Self {
+        Self { held: None }
+    }
+}
+
+impl<S: State> Stepper<S> for Heun<S> {
     fn order(&self) -> u32 {
-        2
+        3
     }
 
     fn negative_real_interval(&self) -> f64 {
-        2.0
+        2.5127453266183286
     }
 
     fn imaginary_interval(&self) -> f64 {
-        0.0
+        3.0_f64.sqrt()
     }
 
-    fn step(&mut self, t: f64, dt: f64, u: &mut Vec<f64>, rhs: &mut Rhs<'_, Vec<f64>>) -> Result<()> {
+    fn step(&mut self, t: f64, dt: f64, u: &mut S, rhs: &mut Rhs<'_, S>) -> Result<()> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(TimeError::Step { dt }.into());
         }
         if t + dt == t {
             return Err(TimeError::NoProgress { t, dt }.into());
         }
-        let finite = |u: &Vec<f64>, stage, t| match u.first_non_finite() {
+        let finite = |u: &S, stage, t| match u.first_non_finite() {
             None => Ok(()),
             Some(p) => Err(Error::from(TimeError::NotFinite { stage, t }).at(p)),
         };
-        let [first, second, next] = self.held.get_or_insert_with(|| std::array::from_fn(|_| u.clone()));
+        let [first, rate, next] = self.held.get_or_insert_with(|| std::array::from_fn(|_| u.clone()));
         first.assign(u);
-        second.assign(u);
+        rate.assign(u);
+        next.assign(u);
         rhs(t, u, first)?;
         first.same_shape(u)?;
         finite(first, 1, t)?;
-        next.assign(u);
-        next.add_scaled(dt, first);
-        rhs(t + dt, next, second)?;
-        second.same_shape(u)?;
-        finite(second, 2, t + dt)?;
-        next.assign(u);
-        next.add_scaled(0.5 * dt, first);
-        next.add_scaled(0.5 * dt, second);
-        finite(next, 3, t + dt)?;
+        next.set_sum(u, dt / 3.0, first);
+        for (stage, share) in [(2, 2.0 / 3.0), (3, 0.75)] {
+            let at = t + f64::from(stage - 1) / 3.0 * dt;
+            rhs(at, next, rate)?;
+            rate.same_shape(u)?;
+            finite(rate, stage as usize, at)?;
+            next.set_sum(u, share * dt, rate);
+        }
+        next.add_scaled(0.25 * dt, first);
+        finite(next, 4, t + dt)?;
         std::mem::swap(u, next);
         Ok(())
     }
@@ -374,15 +390,15 @@ impl Stepper<Vec<f64>> for Heun {
 #[test]
 fn foreign_stepper_passes_and_integrates_within_the_limit() -> Result<()> {
     let report = check_stepper(Heun::default).unwrap();
-    assert_eq!(report.stages, 2);
+    assert_eq!(report.stages, 3);
 
     let n = 64;
     let particles = Particles::lattice([0.0], [1.0], [n])?;
     let pse = Pse::new(Laplacian::<1>, 2, Epsilon::global(2.0 / n as f64)?, particles.volumes()?)?;
     let rows = pse.assemble(&CellList::build(&particles, &Domain::periodic([0.0], [1.0])?, pse.cutoff())?)?;
     let limit = StepLimit::from_spectral_bound(rows.report().spectral_bound, 1.0)?;
-    let plan = Plan::new(0.0, 0.02, 1.0)?.limit(limit).cut_for(&Heun::default())?;
-    assert_eq!(limit.step(&Heun::default()), limit.step(&Euler::<Vec<f64>>::new()));
+    let plan = Plan::new(0.0, 0.02, 1.0)?.limit(limit).cut_for(&Heun::<Vec<f64>>::default())?;
+    assert!(limit.step(&Heun::<Vec<f64>>::default()) > 1.25 * limit.step(&Euler::<Vec<f64>>::new()));
     let start: Vec<f64> = particles.points().iter().map(|x| (TAU * x[0]).sin()).collect();
     let mut u = start.clone();
     let run = integrate(
@@ -416,5 +432,40 @@ fn foreign_stepper_passes_and_integrates_within_the_limit() -> Result<()> {
         |_, _, _| {},
     )?;
     assert!(!run.within_limit);
+    Ok(())
+}
+
+#[test]
+fn all_four_run_a_scene() -> Result<()> {
+    // du/dt + u_x = D u_xx on the ring: kernel and method by the provider, moved by the stepper.
+    const D: f64 = 0.02;
+    const END: f64 = 0.25;
+    let particles = Particles::lattice([0.0], [1.0], [64])?;
+    let circle = Circle { count: 64, reach: 12, generation: particles.generation() };
+    let pse = || Pse::with_kernels([Ring::new()], Epsilon::global(2.0 / 64.0)?, particles.volumes()?);
+    let wave = |x: &[f64; 1], t: f64| (-D * TAU * TAU * t).exp() * (TAU * (x[0] - t)).sin();
+    let mut u: Vec<f64> = particles.points().iter().map(|x| wave(x, 0.0)).collect();
+    let start = u.clone();
+    let scene = AdvectionDiffusion::<1>::new().diffusion(D, pse()?).advection([1.0], Central(Slope(1.5 / 64.0)));
+    let mut run = Eulerian::new(scene, &particles, &circle, Heun::default())?;
+    let limits = run.limits(&u)?;
+    let dt = limits.step(&Heun::<Vec<f64>>::default());
+    assert_eq!(limits.binding(&Heun::<Vec<f64>>::default()), Some(Limit::Advection));
+    assert!(matches!(run.step(&mut u, 1.01 * dt).err().unwrap().kind(), ErrorKind::Solver(SolverError::Limit { .. })));
+    run.advance(&mut u, END, dt)?;
+    // The slope slows the wave by (k h)^2/6 of v k t = pi/2, the kernel its decay by 7 (k epsilon)^2/24 of D k^2 t = 0.2: 2.5e-3
+    // and 2.2e-3; the stepper leaves (v k dt)^4/24 a step.
+    let worst = particles.points().iter().zip(&u).map(|(x, u)| (u - wave(x, END)).abs()).fold(0.0, f64::max);
+    assert!(worst < 5e-3, "{worst}");
+    assert!(run.ledger().fields[0].drift.abs() < 1e-14);
+
+    // Carried along, kernel and stepper alone: what is left is the decay.
+    let scene = AdvectionDiffusion::<1>::new().diffusion(D, pse()?).advection([1.0], Carried);
+    let ring = Domain::periodic([0.0], [1.0])?;
+    let mut moving = Lagrangian::new(scene, &particles, &start, &ring, Heun::default())?;
+    moving.advance(END, 0.01)?;
+    let apart = |(x, u): (&[f64; 1], f64)| (u - wave(x, END)).abs();
+    let worst = moving.points().iter().zip(moving.values()).map(apart).fold(0.0, f64::max);
+    assert!(worst < 3e-3, "{worst}");
     Ok(())
 }

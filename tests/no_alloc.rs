@@ -303,6 +303,79 @@ fn eulerian_steps_after_the_first_allocate_nothing() -> parops::Result<()> {
 
 #[cfg(not(feature = "rayon"))]
 #[test]
+fn upwind_dcpse_and_hyperviscosity_allocate_nothing() -> parops::Result<()> {
+    use parops::{Advect, DcPse, Hyperviscosity, Nearest, UpwindDcPse};
+    let (set, torus) = particles();
+    let n = set.len();
+    let velocities: Vec<[f64; 2]> = set.points().iter().map(|x| [x[1] - 0.5, 0.5 - x[0]]).collect();
+    let (f, mut out) = (vec![1.0; n], vec![0.0; n]);
+    let (fields, mut results) = (vec![[1.0; 3]; n], vec![[0.0; 3]; n]);
+    for method in [UpwindDcPse::half_stencils(), UpwindDcPse::biased(set.spacing()?)] {
+        let rows = method.assemble(&Nearest::build(&set, &torus, method.neighbors::<2>()?)?)?;
+        assert_eq!(allocations(|| rows.apply(&velocities, &f, &mut out).unwrap()), 0);
+        assert_eq!(allocations(|| rows.advect(&velocities, &f, &mut out).unwrap()), 0);
+        assert_eq!(allocations(|| rows.apply_fields(&velocities, &fields, &mut results).unwrap()), 0);
+        assert_eq!(allocations(|| assert!(rows.rate_bound(&velocities).unwrap() > 0.0)), 0);
+    }
+    let laplacian = DcPse::<Laplacian<2>, 4>::new();
+    let neighbors = Nearest::build(&set, &torus, laplacian.fewest_neighbors::<2>()?)?;
+    let mut damping = Hyperviscosity::new(laplacian.assemble(&neighbors)?, 4, set.spacing()?, 0.1)?;
+    assert_eq!(allocations(|| damping.add(&velocities, &f, &mut out).unwrap()), 0);
+    Ok(())
+}
+
+#[cfg(not(feature = "rayon"))]
+#[test]
+fn steps_of_every_advection_scheme_after_the_first_allocate_nothing() -> parops::Result<()> {
+    use parops::{AdvectionDiffusion, Boundary, Eulerian, GrowthPolicy, Nearest, Stabilized, StepPolicy, Transport};
+    use parops::{UpwindDcPse, UpwindGradient};
+    fn count<X: Transport<1>>(scheme: X, neighbors: &impl Neighbors<1>, set: &Particles<1>) -> parops::Result<usize> {
+        // The flow turns, and comes in at both ends in turns.
+        let inflow = (0..4).map(|p| (p, [-1.0])).chain((36..40).map(|p| (p, [1.0])));
+        let scene = AdvectionDiffusion::<1>::new()
+            .advection(|_: &[f64; 1], t: f64| [(200.0 * t).sin()], scheme)
+            .divergence(|x: &[f64; 1], t: f64| x[0] * t)
+            .boundary(Boundary::new(1).inflow(inflow), |_, x, _| x[0]);
+        let growth = GrowthPolicy::Unknown;
+        let mut run = Eulerian::with_policy(scene, set, neighbors, Rk4::new(), StepPolicy::Refuse, growth)?;
+        let mut u = vec![1.0; set.len()];
+        run.step(&mut u, 1e-3)?;
+        Ok(allocations(|| (0..40).for_each(|_| assert!(run.step(&mut u, 1e-3).is_ok()))))
+    }
+    let line = Particles::lattice([0.0], [1.0], [40])?;
+    let near = Nearest::build(&line, &Domain::open(), 12)?;
+    let upwind = UpwindGradient::new(line.spacing()?.epsilon(1.0)?, line.volumes()?);
+    let cells = CellList::build(&line, &Domain::open(), upwind.cutoff())?;
+    assert_eq!(count(upwind, &cells, &line)?, 0);
+    assert_eq!(count(UpwindDcPse::half_stencils(), &near, &line)?, 0);
+    assert_eq!(count(Stabilized::<1, 2>::new(line.spacing()?).gamma(0.1), &near, &line)?, 0);
+    Ok(())
+}
+
+#[cfg(not(feature = "rayon"))]
+#[test]
+fn lagrangian_steps_of_pure_advection_allocate_nothing() -> parops::Result<()> {
+    use parops::{AdvectionDiffusion, Carried, Lagrangian, MovingScene, MovingSettings, Steady};
+    fn count<S: MovingScene<2, Value = f64>>(scene: S, set: &Particles<2>, torus: &Domain<2>) -> parops::Result<usize> {
+        let mut settings = MovingSettings::default();
+        settings.skin = Some(0.05);
+        let mut run = Lagrangian::with_settings(scene, set, &vec![1.0; set.len()], torus, Rk4::new(), settings)?;
+        (0..2).try_for_each(|_| run.step(1e-4).map(|_| ()))?;
+        let before = run.ledger().rebuilds;
+        let count = allocations(|| (0..4).for_each(|_| assert!(run.step(1e-4).is_ok())));
+        assert_eq!(run.ledger().rebuilds, before);
+        Ok(count)
+    }
+    let set = Particles::jittered([0.0; 2], [1.0; 2], [24; 2], 0.2, 3)?;
+    let torus = Domain::periodic([0.0; 2], [1.0; 2])?;
+    let scene = AdvectionDiffusion::<2>::new;
+    let shear = Steady(|x: &[f64; 2]| [x[1], 0.0]);
+    assert_eq!(count(scene().advection(shear, Carried), &set, &torus)?, 0);
+    Ok(())
+}
+
+#[cfg(not(feature = "rayon"))]
+#[test]
 fn implicit_steps_after_the_first_allocate_nothing() {
     let (particles, domain) = particles();
     let pse = laplacian(&particles);

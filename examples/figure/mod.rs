@@ -28,6 +28,7 @@ pub enum Mark {
     Triangles,
     Crosses,
     CirclesAlone,
+    Squares,
 }
 
 /// Titles and kind of axes of one panel.
@@ -39,7 +40,7 @@ pub struct Axes<'a> {
 }
 
 const SIZE: (u32, u32) = (760, 560);
-const PALETTE: [RGBColor; 8] = [
+const PALETTE: [RGBColor; 10] = [
     RGBColor(31, 87, 166),
     RGBColor(206, 77, 38),
     RGBColor(35, 133, 72),
@@ -48,7 +49,12 @@ const PALETTE: [RGBColor; 8] = [
     RGBColor(178, 130, 0),
     RGBColor(0, 139, 149),
     RGBColor(130, 130, 130),
+    RGBColor(214, 99, 168),
+    RGBColor(128, 84, 60),
 ];
+
+/// Where a panel is drawn.
+pub type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
 /// Draws panels side by side into one SVG file.
 pub fn draw(path: &Path, panels: &[(Axes, Vec<Curve>)]) -> Result<(), Box<dyn Error>> {
@@ -63,19 +69,33 @@ fn drawing<'a>(svg: &'a mut String, panels: &[(Axes, Vec<Curve>)]) -> Result<(),
     let root = SVGBackend::with_string(svg, (width, SIZE.1)).into_drawing_area();
     root.fill(&WHITE)?;
     for ((axes, curves), area) in panels.iter().zip(root.split_evenly((1, panels.len()))) {
-        let [x, y] = [bounds(curves, axes.logarithmic, |p| p.0), bounds(curves, axes.logarithmic, |p| p.1)];
-        if axes.logarithmic {
-            panel(&area, axes, curves, (x.0..x.1).log_scale(), (y.0..y.1).log_scale(), power_of_ten)?;
-        } else {
-            panel(&area, axes, curves, x.0..x.1, y.0..y.1, plain)?;
-        }
+        panel_of(&area, axes, curves, 1.0)?;
     }
     root.present()?;
     Ok(())
 }
 
+/// Draws one panel into an area; the ends of a logarithmic axis are at least the factor `span` apart.
+pub fn panel_of<'a>(area: &Area<'a>, axes: &Axes, curves: &[Curve], span: f64) -> Result<(), Box<dyn Error + 'a>> {
+    let [x, y] = [bounds(curves, axes.logarithmic, |p| p.0), bounds(curves, axes.logarithmic, |p| p.1)];
+    if axes.logarithmic {
+        let [x, y] = [x, y].map(|(low, high)| {
+            let more = (span * low / high).max(1.0).sqrt();
+            (low / more, high * more)
+        });
+        panel(area, axes, curves, (x.0..x.1).log_scale(), (y.0..y.1).log_scale(), power_of_ten)
+    } else {
+        panel(area, axes, curves, x.0..x.1, y.0..y.1, plain)
+    }
+}
+
+/// The color of this index.
+pub fn color(index: usize) -> RGBColor {
+    PALETTE[index % PALETTE.len()]
+}
+
 fn panel<'a, X, Y>(
-    area: &DrawingArea<SVGBackend<'a>, plotters::coord::Shift>,
+    area: &Area<'a>,
     axes: &Axes,
     curves: &[Curve],
     x: X,
@@ -105,7 +125,7 @@ where
         .axis_desc_style(("sans-serif", 17))
         .draw()?;
     for curve in curves {
-        let color = PALETTE[curve.color % PALETTE.len()];
+        let color = color(curve.color);
         let points = || curve.points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite());
         if curve.mark == Mark::Dashed {
             let dashes = DashedLineSeries::new(points(), 6, 5, color.stroke_width(1));
@@ -123,7 +143,10 @@ where
             Mark::Crosses => {
                 chart.draw_series(points().map(|p| Cross::new(p, 5, color.stroke_width(2))))?;
             }
-            Mark::Line | Mark::Dashed => {}
+            Mark::Line | Mark::Dashed | Mark::Squares => {}
+        }
+        if curve.mark == Mark::Squares {
+            chart.draw_series(points().map(|p| EmptyElement::at(p) + square((0, 0), 4, color)))?;
         }
         if !curve.name.is_empty() {
             let mark = curve.mark;
@@ -138,23 +161,30 @@ where
         return Ok(());
     }
     let (columns, rows) = chart.plotting_area().get_pixel_range();
-    let middle = ((columns.start + columns.end) / 2, (rows.start + rows.end) / 2);
     let drawn: Vec<(i32, i32)> = curves
         .iter()
         .flat_map(|curve| dense(&curve.points, axes.logarithmic))
         .map(|p| chart.backend_coord(&p))
         .collect();
-    // The corner that fewest points share with the legend.
-    let hidden = |&(_, left, low): &(SeriesLabelPosition, bool, bool)| {
-        drawn.iter().filter(|p| (p.0 < middle.0) == left && (p.1 > middle.1) == low).count()
-    };
-    let corners = [
-        (SeriesLabelPosition::LowerLeft, true, true),
-        (SeriesLabelPosition::UpperRight, false, false),
-        (SeriesLabelPosition::LowerRight, false, true),
-        (SeriesLabelPosition::UpperLeft, true, false),
+    // About what the legend takes.
+    let names = || curves.iter().map(|curve| curve.name.len()).filter(|&length| length > 0);
+    let size = (70 + 8 * names().max().unwrap_or(0) as i32, 20 + 20 * names().count() as i32);
+    let (right, low) = (columns.end - size.0, rows.end - size.1);
+    let middle = (rows.start + rows.end - size.1) / 2;
+    let places = [
+        (SeriesLabelPosition::LowerLeft, columns.start, low),
+        (SeriesLabelPosition::UpperRight, right, rows.start),
+        (SeriesLabelPosition::LowerRight, right, low),
+        (SeriesLabelPosition::UpperLeft, columns.start, rows.start),
+        (SeriesLabelPosition::MiddleLeft, columns.start, middle),
+        (SeriesLabelPosition::MiddleRight, right, middle),
     ];
-    let position = corners.into_iter().min_by_key(hidden).map_or(SeriesLabelPosition::UpperRight, |corner| corner.0);
+    // The place where it hides least.
+    let hidden = |&(_, left, top): &(SeriesLabelPosition, i32, i32)| {
+        let under = |p: &&(i32, i32)| (left..left + size.0).contains(&p.0) && (top..top + size.1).contains(&p.1);
+        drawn.iter().filter(under).count()
+    };
+    let position = places.into_iter().min_by_key(hidden).map_or(SeriesLabelPosition::UpperRight, |place| place.0);
     chart
         .configure_series_labels()
         .position(position)
@@ -177,15 +207,22 @@ fn dense(points: &[(f64, f64)], logarithmic: bool) -> impl Iterator<Item = (f64,
         .filter(|p| p.0.is_finite() && p.1.is_finite())
 }
 
-fn legend<'a>(x: i32, y: i32, mark: Mark, color: RGBColor) -> DynElement<'static, SVGBackend<'a>, (i32, i32)> {
+/// What a curve looks like in a legend, at a place.
+pub fn legend<'a>(x: i32, y: i32, mark: Mark, color: RGBColor) -> DynElement<'static, SVGBackend<'a>, (i32, i32)> {
     let line = |width| PathElement::new(vec![(x, y), (x + 22, y)], color.stroke_width(width)).into_dyn();
     match mark {
         Mark::Circles | Mark::CirclesAlone => Circle::new((x + 11, y), 5, color.filled()).into_dyn(),
         Mark::Triangles => TriangleMarker::new((x + 11, y), 7, color.filled()).into_dyn(),
+        Mark::Squares => square((x + 11, y), 5, color).into_dyn(),
         Mark::Crosses => Cross::new((x + 11, y), 6, color.stroke_width(2)).into_dyn(),
         Mark::Line => line(2),
         Mark::Dashed => DashedPathElement::new([(x, y), (x + 22, y)], 6, 3, color.stroke_width(1)).into_dyn(),
     }
+}
+
+/// A square of twice this side.
+fn square((x, y): (i32, i32), half: i32, color: RGBColor) -> Rectangle<(i32, i32)> {
+    Rectangle::new([(x - half, y - half), (x + half, y + half)], color.filled())
 }
 
 /// The range of all points with a margin, in the measure of the axis.
@@ -198,7 +235,17 @@ fn bounds(curves: &[Curve], logarithmic: bool, coordinate: impl Fn(&(f64, f64)) 
         return (0.1, 1.0);
     }
     if logarithmic {
-        (low / 1.6, high * 1.6)
+        let (low, high) = (low / 1.6, high * 1.6);
+        // An axis without a power of ten would have no label.
+        let (below, above) = (10.0_f64.powf(low.log10().floor()), 10.0_f64.powf(high.log10().ceil()));
+        let bare = below * 10.0 > high;
+        if !bare {
+            (low, high)
+        } else if low / below < above / high {
+            (0.999 * below, high)
+        } else {
+            (low, 1.001 * above)
+        }
     } else {
         let margin = 0.05 * (high - low).max(f64::MIN_POSITIVE);
         (low - margin, high + margin)

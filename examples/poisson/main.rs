@@ -16,6 +16,9 @@ mod figure;
 #[cfg(feature = "faer")]
 mod figures;
 #[cfg(feature = "faer")]
+#[path = "../map/mod.rs"]
+mod map;
+#[cfg(feature = "faer")]
 #[path = "../options/mod.rs"]
 mod options;
 #[cfg(feature = "faer")]

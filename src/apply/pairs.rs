@@ -12,6 +12,24 @@ impl<const K: usize, T: Field> Rows<[f64; K], T> {
         (self.diagonal.get(p).copied(), pairs.map(|(&q, &w)| (q as usize, w)))
     }
 
+    /// Whether Gershgorin's discs, the row sums around the diagonal, leave no eigenvalue a real part above `tolerance` times
+    /// their modulus: A_pp + sum_q |A_pq| = d_p + 2 sum_q max(-w_pq, 0) is that small in every row and output.
+    pub(crate) fn cannot_grow(&self, tolerance: f64) -> bool {
+        (0..self.targets()).all(|p| {
+            let (diagonal, pairs) = self.pairs(p);
+            let mut right = diagonal.map_or([0.0; K], |d| d.map(|d| d.as_()));
+            let mut size = right.map(f64::abs);
+            for (_, w) in pairs {
+                for ((right, size), w) in right.iter_mut().zip(&mut size).zip(w) {
+                    let w: f64 = w.as_();
+                    *right += 2.0 * (-w).max(0.0);
+                    *size += w.abs();
+                }
+            }
+            right.iter().zip(size).all(|(right, size)| *right <= tolerance * size)
+        })
+    }
+
     /// The matrix entries (q, A_pq) of row p, where target p is source p, each the contraction of its K weights.
     pub(crate) fn entries_of(&self, p: usize, contract: impl Fn([f64; K]) -> f64, entry: &mut dyn FnMut(usize, f64)) {
         let (diagonal, pairs) = self.pairs(p);

@@ -5,7 +5,7 @@ use super::{Field, Rows};
 use crate::error::{Error, ErrorKind, OperatorError, Result};
 use crate::multi_index::MultiIndex;
 use crate::neighbors::{Neighbors, Upstream};
-use crate::operator::{DcPse, Expression, Facing, Fallback, Sign};
+use crate::operator::{DcPse, Expression, Facing, Fallback, Screened, Sign};
 use crate::scale::Spacing;
 use crate::stencil::Side;
 
@@ -95,7 +95,7 @@ impl UpwindDcPse {
                 None => Upstream::half(neighbors, axis, side, k)?,
                 Some(h) => Upstream::biased(neighbors, axis, side, h, k)?,
             };
-            Rows::assemble(&Facing { method: derivative, axis, side }, &upstream)
+            Rows::assemble(&Screened { method: &derivative, screen: Facing { axis, side } }, &upstream)
                 .map_err(|error| named(error, axis, side))
         })
     }

@@ -11,6 +11,7 @@ mod multi_index;
 mod neighbor;
 mod operator;
 mod particle;
+mod report;
 mod solver;
 mod time;
 
@@ -25,6 +26,7 @@ pub use multi_index::MultiIndexError;
 pub use neighbor::NeighborError;
 pub use operator::OperatorError;
 pub use particle::ParticleError;
+pub use report::ReportError;
 pub use solver::{Limit, SolverError};
 pub use time::TimeError;
 
@@ -137,6 +139,7 @@ impl fmt::Display for ErrorKind {
             ErrorKind::Boundary(kind) => kind.fmt(f),
             ErrorKind::Time(kind) => kind.fmt(f),
             ErrorKind::Solver(kind) => kind.fmt(f),
+            ErrorKind::Report(kind) => kind.fmt(f),
             ErrorKind::User { code } => write!(f, "the caller's own error, code {code}"),
         }
     }
@@ -174,6 +177,8 @@ pub enum ErrorKind {
     Time(TimeError),
     /// Solvers: scenes and their steps.
     Solver(SolverError),
+    /// Tables of samples and their pages.
+    Report(ReportError),
     /// An error made by the caller's own code, see [`Error::user`].
     User {
         /// The number the caller chose.
@@ -210,4 +215,5 @@ from_kind! {
     Boundary: BoundaryError,
     Time: TimeError,
     Solver: SolverError,
+    Report: ReportError,
 }

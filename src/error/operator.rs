@@ -19,7 +19,7 @@ kinds! {
             defect: f64,
             /// The largest legal value.
             limit: f64,
-        } => "the discrete moments miss their conditions by {defect}, more than {limit}",
+        } => "the discrete moments miss their conditions by {defect}, more than {limit}: the set is too irregular for a fixed kernel, DC-PSE solves for its weights",
         /// A target that is no particle, for an operator that needs f_p.
         NoCenter {
             /// Number of neighbors of the target.

@@ -191,7 +191,34 @@ kinds! {
             /// Faces of the domain.
             domain: [f64; 2],
         } => "axis {axis}: the mesh from {mesh:?} is not periodic where the domain from {domain:?} is, or the other way round, or with another period",
-        /// A remeshing trigger that would never, or always, be met.
+        /// Particles that have moved too far apart or too close together.
+        OverlapLost {
+            /// The largest hole, in spacings of the mesh.
+            hole: f64,
+            /// The largest legal hole.
+            most: f64,
+            /// The least gap, in spacings of the mesh; infinite above 1.
+            gap: f64,
+            /// The least legal gap.
+            least: f64,
+        } => "overlap is lost: the largest hole is {hole} spacings wide (at most {most}), the least gap {gap} (at least {least}): remesh, or take shorter steps",
+        /// A mass that has drifted by more than its budget.
+        Drift {
+            /// The field.
+            field: usize,
+            /// Mass less mass at the start.
+            drift: f64,
+            /// sum_p |omega_p|.
+            size: f64,
+            /// The largest legal drift over size.
+            budget: f64,
+        } => "field {field}: the mass has drifted by {drift:e}, more than {budget:e} of {size:e}",
+        /// A drift budget that is not positive.
+        Budget {
+            /// The budget.
+            value: f64,
+        } => "a drift budget is a positive number, not {value}",
+        /// A remeshing trigger, or a watch, that would never, or always, be met.
         Trigger {
             /// Its number.
             value: f64,

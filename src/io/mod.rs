@@ -9,3 +9,5 @@ mod xml;
 pub(crate) use counted::{Counted, counted};
 pub use pvd::Pvd;
 pub use vtu::{Vtu, VtuValues};
+#[cfg(feature = "testing")]
+pub(crate) use xml::Escaped;

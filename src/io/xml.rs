@@ -21,8 +21,8 @@ pub(super) fn check_name<'a>(name: &str, mut earlier: impl ExactSizeIterator<Ite
     }
 }
 
-/// A legal name as the value of an attribute.
-pub(super) struct Escaped<'a>(pub(super) &'a str);
+/// Text as it stands in an element or an attribute; of a name, a legal one.
+pub(crate) struct Escaped<'a>(pub(crate) &'a str);
 
 impl fmt::Display for Escaped<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -94,7 +94,19 @@ pub trait Kernel<T: Scalar, const D: usize>: Send + Sync {
 
 /// A smoothing kernel W: even, Int W = 1, differentiable.
 ///
-/// Source: notes 001, sec. 5.1.
+/// Usable overlap, as h/epsilon: from above sums over a lattice bound it; from below pairs do, where particles move along
+/// -grad sum_q W (measured in two dimensions).
+///
+/// | kernel | largest h/epsilon for D = 1, 2, 3 | pairs form below |
+/// |---|---|---|
+/// | [`Gaussian`](crate::Gaussian) | 0.94, 0.94, 0.94 | never |
+/// | [`WendlandC2`](crate::WendlandC2) | 0.93, 0.76, 0.77 | never |
+/// | [`WendlandC4`](crate::WendlandC4) | 1.00, 0.79, 0.79 | never |
+/// | [`WendlandC6`](crate::WendlandC6) | 0.93, 0.77, 0.75 | never |
+/// | [`CubicSpline`](crate::CubicSpline) | 1.00, 1.00, 1.00 | 0.77 |
+/// | [`QuinticSpline`](crate::QuinticSpline) | 1.00, 1.00, 1.00 | 0.71 |
+///
+/// Source: notes 001, sec. 5.1; pairing as in Dehnen and Aly 2012, sec. 3.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is no smoothing kernel in {D} dimensions",
     label = "expected a smoothing kernel in {D} dimensions",

@@ -61,6 +61,42 @@ impl<T: Field> CsrMatrix<T> {
         Ok(matrix)
     }
 
+    /// The matrix whose row p has the entries (column, value) that `row` pushes, in any order; entries of one column are
+    /// summed in the order pushed. Every row is asked for twice, to be counted and to be stored.
+    ///
+    /// # Errors
+    /// As [`from_triplets`](Self::from_triplets).
+    pub(crate) fn from_rows(
+        rows: usize,
+        columns: usize,
+        mut row: impl FnMut(usize, &mut Vec<(usize, T)>),
+    ) -> Result<Self> {
+        check_width(columns)?;
+        let mut own = Vec::new();
+        let mut sorted = |p: usize, own: &mut Vec<(usize, T)>| {
+            own.clear();
+            row(p, own);
+            own.sort_by_key(|entry| entry.0);
+            match own.last() {
+                Some(&(column, _)) if column >= columns => {
+                    Err(Error::from(LinearError::Index { row: p, column, rows, columns }))
+                }
+                _ => Ok(()),
+            }
+        };
+        let mut entries = 0;
+        for p in 0..rows {
+            sorted(p, &mut own)?;
+            entries += own.chunk_by(|a, b| a.0 == b.0).count();
+        }
+        let mut matrix = Self::empty(columns, rows, entries)?;
+        for p in 0..rows {
+            sorted(p, &mut own)?;
+            matrix.push_row(own.iter().map(|&(column, value)| (column as u32, value)))?;
+        }
+        Ok(matrix)
+    }
+
     /// The identity of n rows.
     ///
     /// # Errors

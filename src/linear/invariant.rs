@@ -1,6 +1,8 @@
 //! The invariant subspace of a small real matrix that belongs to its foremost eigenvalues.
 
-use nalgebra::{Complex, DMatrix, Schur, SymmetricEigen};
+use nalgebra::{Complex, DMatrix, DVector, Schur, SymmetricEigen};
+
+use crate::particles::Random;
 
 type C = Complex<f64>;
 
@@ -26,8 +28,7 @@ impl Ordered {
         // themselves: the shift puts them between 1 and 3.
         let mut shifted = h / scale;
         (0..size).for_each(|i| shifted[(i, i)] += 2.0);
-        let schur = |eps: f64| Schur::try_new(shifted.clone(), eps * f64::EPSILON, 100 * size.max(10));
-        let (u, mut t) = [1.0, 32.0, 1024.0].into_iter().find_map(schur)?.unpack();
+        let (u, mut t) = (0..TURNS).find_map(|turn| schur(&shifted, turn))?;
         (0..size).for_each(|i| t[(i, i)] -= 2.0);
         let (mut u, mut t) = (u.map(|x| C::new(x, 0.0)), t.map(|x| C::new(x, 0.0)));
         // How many eigenvalues belong together at each place: 1, or 2 for conjugates.
@@ -81,6 +82,27 @@ impl Ordered {
         order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
         Some(DMatrix::from_fn(size, k, |row, column| eigen.eigenvectors[(row, order[column])]))
     }
+}
+
+/// How often a Schur form is looked for.
+const TURNS: u64 = 4;
+
+/// U and T with A U = U T. The iteration may go in circles: then A is first reflected, P A P with P = 1 - 2 v v^T for a
+/// pseudo-random unit vector v, another one each `turn`, and P U taken for U.
+fn schur(a: &DMatrix<f64>, turn: u64) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+    let size = a.nrows();
+    let form = |a: &DMatrix<f64>| {
+        let to = |eps: f64| Schur::try_new(a.clone(), eps * f64::EPSILON, 100 * size.max(10));
+        Some([1.0, 32.0, 1024.0].into_iter().find_map(to)?.unpack())
+    };
+    if turn == 0 {
+        return form(a);
+    }
+    let mut random = Random::new(turn);
+    let v = DVector::from_fn(size, |_, _| random.uniform() - 0.5).normalize();
+    let reflection = DMatrix::identity(size, size) - &v * v.transpose() * 2.0;
+    let (u, t) = form(&(&reflection * a * &reflection))?;
+    Some((reflection * u, t))
 }
 
 /// Multiplies rows i and i + 1 of T by the unitary [[a, b], [-b*, a*]], and columns of T and U by its adjoint.

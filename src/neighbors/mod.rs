@@ -15,6 +15,7 @@ mod order;
 mod overlap;
 mod pair;
 mod placed;
+mod quality;
 mod row_check;
 mod rows;
 mod selected;
@@ -33,6 +34,7 @@ pub use measure::{epsilon_from_neighbors, mean_neighbor_distance, volumes_from_n
 pub use nearest::Nearest;
 pub use overlap::{fill_distance, least_gap};
 pub use pair::{Pair, Symmetry};
+pub use quality::SetQuality;
 pub use selected::Selected;
 #[cfg(feature = "kiddo")]
 pub use tree::KdTree;

@@ -3,7 +3,6 @@
 use num_traits::AsPrimitive;
 
 use super::fields::Fields;
-use super::free::Free;
 use super::limits::Rate;
 use super::term::Site;
 use super::transport::{Transport, TransportRows};
@@ -43,7 +42,7 @@ impl<const D: usize, E: Fields> CentralRows<D, E> {
         site: &Site<D>,
         neighbors: &P,
     ) -> Result<Self> {
-        let rows = Rows::assemble(&Free { method, site }, neighbors)?;
+        let rows = Rows::assemble(&site.screened(method), neighbors)?;
         Ok(Self { bounds: row_sums(&rows), rows })
     }
 }

@@ -69,9 +69,12 @@ impl<F: Fn(&[f64; D]) -> f64 + Sync, const D: usize> Diffusivity<D> for F {
 /// assert_eq!((gust.steady(), gust.at(0, &[0.0], 0.5)), (false, [0.5]));
 /// ```
 pub trait Velocity<const D: usize>: Sync {
-    /// Whether it is the same at all times.
+    /// Whether it is known between the particles too; otherwise its gradient is that of the values at the particles.
+    const EVERYWHERE: bool = true;
+
+    /// Whether it is the same at all times: what hangs on it is then computed once. Not by default.
     fn steady(&self) -> bool {
-        true
+        false
     }
 
     /// Checks that there is a vector for each of so many particles.
@@ -86,9 +89,9 @@ pub trait Velocity<const D: usize>: Sync {
     /// The velocity at particle p, which is at x, at time t.
     fn at(&self, p: usize, x: &[f64; D], t: f64) -> [f64; D];
 
-    /// The gradient dv_j/dx_k at \[j]\[k], by default from central differences over 2 `step`; `None` where the velocity
-    /// is only known at the particles.
-    fn gradient(&self, p: usize, x: &[f64; D], t: f64, step: f64) -> Option<[[f64; D]; D]> {
+    /// The gradient dv_j/dx_k at \[j]\[k], by default from central differences over 2 `step`; asked for only where the
+    /// velocity is known [`EVERYWHERE`](Self::EVERYWHERE).
+    fn gradient(&self, p: usize, x: &[f64; D], t: f64, step: f64) -> [[f64; D]; D] {
         let mut gradient = [[0.0; D]; D];
         for k in 0..D {
             let (mut above, mut below) = (*x, *x);
@@ -99,22 +102,32 @@ pub trait Velocity<const D: usize>: Sync {
                 row[k] = (v - w) / width;
             }
         }
-        Some(gradient)
+        gradient
     }
 }
 
 impl<const D: usize> Velocity<D> for [f64; D] {
+    fn steady(&self) -> bool {
+        true
+    }
+
     #[inline(always)]
     fn at(&self, _: usize, _: &[f64; D], _: f64) -> [f64; D] {
         *self
     }
 
-    fn gradient(&self, _: usize, _: &[f64; D], _: f64, _: f64) -> Option<[[f64; D]; D]> {
-        Some([[0.0; D]; D])
+    fn gradient(&self, _: usize, _: &[f64; D], _: f64, _: f64) -> [[f64; D]; D] {
+        [[0.0; D]; D]
     }
 }
 
 impl<const D: usize> Velocity<D> for Vec<[f64; D]> {
+    const EVERYWHERE: bool = false;
+
+    fn steady(&self) -> bool {
+        true
+    }
+
     fn validate(&self, particles: usize) -> Result<()> {
         one_each(self.len(), particles)
     }
@@ -124,16 +137,12 @@ impl<const D: usize> Velocity<D> for Vec<[f64; D]> {
         self.get(p).copied().unwrap_or([f64::NAN; D])
     }
 
-    fn gradient(&self, _: usize, _: &[f64; D], _: f64, _: f64) -> Option<[[f64; D]; D]> {
-        None
+    fn gradient(&self, _: usize, _: &[f64; D], _: f64, _: f64) -> [[f64; D]; D] {
+        [[f64::NAN; D]; D]
     }
 }
 
 impl<F: Fn(&[f64; D], f64) -> [f64; D] + Sync, const D: usize> Velocity<D> for F {
-    fn steady(&self) -> bool {
-        false
-    }
-
     #[inline(always)]
     fn at(&self, _: usize, x: &[f64; D], t: f64) -> [f64; D] {
         self(x, t)
@@ -148,6 +157,10 @@ pub struct Steady<F>(
 );
 
 impl<F: Fn(&[f64; D]) -> [f64; D] + Sync, const D: usize> Velocity<D> for Steady<F> {
+    fn steady(&self) -> bool {
+        true
+    }
+
     #[inline(always)]
     fn at(&self, _: usize, x: &[f64; D], _: f64) -> [f64; D] {
         self.0(x)

@@ -2,7 +2,7 @@
 
 use super::coefficient::{Diffusivity, diffusivities};
 use super::fields::Fields;
-use super::free::Free;
+use super::growth::legal;
 use super::limits::{Limits, Rate};
 use super::term::{SceneTerm, Site};
 use crate::apply::{Report, Rows};
@@ -26,6 +26,13 @@ pub struct Diffusion<C, M> {
 pub struct DiffusionRows<E: Fields> {
     rows: Rows<[f64; 1], E::Scalar>,
     factor: f64,
+    monotone: bool,
+}
+
+impl<E: Fields> DiffusionRows<E> {
+    fn new(rows: Rows<[f64; 1], E::Scalar>, factor: f64) -> Self {
+        Self { monotone: rows.cannot_grow(legal::<E>()), rows, factor }
+    }
 }
 
 impl<C, M> Diffusion<C, M> {
@@ -56,13 +63,13 @@ impl<C: Diffusivity<D>, M: Method<D, Out = [f64; 1]> + Clone, const D: usize, E:
             if !(diffusivity >= 0.0 && diffusivity.is_finite()) {
                 return Err(ParticleError::Diffusivity { diffusivity }.into());
             }
-            let rows = Rows::assemble(&Free { method: &self.method, site }, neighbors)?;
-            return Ok(DiffusionRows { rows, factor: diffusivity });
+            let rows = Rows::assemble(&site.screened(&self.method), neighbors)?;
+            return Ok(DiffusionRows::new(rows, diffusivity));
         }
         let values = diffusivities(&self.diffusivity, site.points())?;
         let method = DivGrad::new(self.method.clone(), values)?.mean(self.mean);
-        let rows = Rows::assemble(&Free { method: &method, site }, neighbors)?;
-        Ok(DiffusionRows { rows, factor: 1.0 })
+        let rows = Rows::assemble(&site.screened(&method), neighbors)?;
+        Ok(DiffusionRows::new(rows, 1.0))
     }
 
     #[inline(always)]
@@ -88,7 +95,7 @@ impl<C: Diffusivity<D>, M: Method<D, Out = [f64; 1]> + Clone, const D: usize, E:
     }
 
     fn monotone(&self, rows: &DiffusionRows<E>) -> bool {
-        rows.rows.report().negative_weights == 0
+        rows.monotone
     }
 
     fn report<'a>(&self, rows: &'a DiffusionRows<E>) -> Option<&'a Report> {

@@ -9,6 +9,7 @@ use super::saved::SavedRun;
 use super::scene::Scene;
 use super::scheme::TimeScheme;
 use super::semi_discrete::SemiDiscrete;
+use super::watch::{check_budget, check_drift};
 use crate::error::{Limit, Result, SolverError, TimeError};
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
@@ -40,6 +41,9 @@ pub struct Eulerian<const D: usize, S: Scene<D>, St> {
     discrete: SemiDiscrete<D, S>,
     stepper: St,
     steps: StepPolicy,
+    growth: GrowthPolicy,
+    /// The rate of the advection that growth was estimated at.
+    estimated: f64,
     sharp: Vec<(Limit, Rate)>,
     ledger: LedgerRow<D>,
     /// Masses at the start, once there is one.
@@ -73,23 +77,20 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     ) -> Result<Self> {
         let mut discrete = SemiDiscrete::new(scene, particles, neighbors, growth)?;
         let mut ledger = LedgerRow::new(S::Value::FIELDS);
-        if growth != GrowthPolicy::Unknown {
-            let spectrum = discrete.spectrum(0.0)?;
-            ledger.growth = match growth {
-                GrowthPolicy::Allow => spectrum.abscissa,
-                _ => SemiDiscrete::<D, S>::check_growth(&spectrum)?,
-            };
-        }
+        ledger.growth = discrete.growth(0.0, growth)?;
         for report in discrete.reports() {
             ledger.condition = ledger.condition.max(report.condition);
             ledger.residual = ledger.residual.max(report.residual);
         }
+        // What the source adds shows before the first step: it may not be defined without a field.
+        let limits = discrete.linear_limits(0.0)?;
         if steps != StepPolicy::Allow {
-            // What the source adds shows before the first step: it may not be defined without a field.
-            discrete.linear_limits(0.0)?.possible_within(|limit| stepper.intervals(limit))?;
+            limits.possible_within(|limit| stepper.intervals(limit))?;
             stepper.check_symmetry(discrete.symmetry())?;
         }
-        Ok(Self { discrete, stepper, steps, sharp: Vec::new(), ledger, start: Vec::new(), t: 0.0, work: Vec::new() })
+        let (estimated, sharp) = (limits.rate(Limit::Advection).fastest(), Vec::new());
+        let (start, t, work) = (Vec::new(), 0.0, Vec::new());
+        Ok(Self { discrete, stepper, steps, growth, estimated, sharp, ledger, start, t, work })
     }
 
     /// Sets what happens to a step above the limit.
@@ -106,6 +107,16 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         self
     }
 
+    /// Refuses steps after which the mass of a field has drifted by more than this share of sum_p |omega_p|, such as 1e-3:
+    /// methods that are exact on scattered particles do not conserve. What sources and boundaries add counts as drift.
+    ///
+    /// # Errors
+    /// [`SolverError::Budget`] where it is not positive.
+    pub fn drift_budget(mut self, budget: f64) -> Result<Self> {
+        self.ledger.budget = check_budget(budget)?;
+        Ok(self)
+    }
+
     /// Sets the time the run is at.
     #[must_use]
     pub fn at(mut self, t: f64) -> Self {
@@ -118,6 +129,15 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         self.t
     }
 
+    /// The longest legal step from here: infinite without a limit.
+    ///
+    /// # Errors
+    /// As [`limits`](Self::limits).
+    pub fn longest_step(&mut self, u: &[S::Value]) -> Result<f64> {
+        let limits = self.limits(u)?;
+        Ok(self.bound(&limits).0)
+    }
+
     /// The ledger after the last step.
     pub fn ledger(&self) -> &LedgerRow<D> {
         &self.ledger
@@ -126,6 +146,11 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     /// The scene on its particles.
     pub fn discrete(&self) -> &SemiDiscrete<D, S> {
         &self.discrete
+    }
+
+    /// What moves the scene in time.
+    pub fn stepper(&self) -> &St {
+        &self.stepper
     }
 
     /// The run as it stands, with the field it has come to; the scene is not in it.
@@ -159,15 +184,19 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     /// # Errors
     /// As [`SemiDiscrete::limits`]; [`TimeError::Shape`] for another number of particles.
     pub fn limits(&mut self, u: &[S::Value]) -> Result<Limits> {
-        self.limits_at(self.t, u)
+        self.limits_of(self.t, 0.0, u)
     }
 
-    fn limits_at(&mut self, t: f64, u: &[S::Value]) -> Result<Limits> {
+    /// What bounds a step from t over dt: the larger rates of its ends, of a source that at t.
+    fn limits_of(&mut self, t: f64, dt: f64, u: &[S::Value]) -> Result<Limits> {
         let (found, needed) = (u.len(), self.discrete.site().points().len());
         if found != needed {
             return Err(TimeError::Shape { found, needed }.into());
         }
         let mut limits = self.discrete.limits(t, u)?;
+        if dt > 0.0 && !self.discrete.steady() {
+            limits = limits.larger(&self.discrete.linear_limits(t + dt)?);
+        }
         self.sharp.iter().for_each(|&(limit, rate)| limits.set(limit, rate));
         Ok(limits)
     }
@@ -176,7 +205,7 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     ///
     /// # Errors
     /// [`SolverError::Limit`] for a step above the limit, [`SolverError::Substeps`] where cutting it does not help;
-    /// [`TimeError::NotFinite`] with particle, stage and time; as [`TimeScheme::step`] and [`SemiDiscrete::rate`]. Field and
+    /// [`SolverError::Drift`] above the [`drift_budget`](Self::drift_budget); [`TimeError::NotFinite`] with particle, stage and time; as [`TimeScheme::step`] and [`SemiDiscrete::rate`]. Field and
     /// run are then as they were.
     pub fn step(&mut self, u: &mut Vec<S::Value>, dt: f64) -> Result<&LedgerRow<D>> {
         self.step_to(u, dt, self.t + dt)
@@ -213,18 +242,17 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(TimeError::Step { dt }.into());
         }
-        let limits = self.limits_at(self.t, u)?;
+        let limits = self.limits_of(self.t, dt, u)?;
         let (limit, binding) = self.bound(&limits);
         let within = dt <= limit;
         if !within && self.steps == StepPolicy::Refuse {
-            return Err(SolverError::Limit { dt, limit, binding: binding.unwrap_or(Limit::Diffusion) }.into());
+            return Err(limits.refuse(dt, limit, binding));
         }
-        if self.start.is_empty() {
-            self.ledger.measure(self.discrete.site().particles(), u, &[]);
-            self.start.extend(self.ledger.fields.iter().map(|field| field.mass));
-        }
+        let (growth, estimated) = self.estimate(&limits, dt)?;
+        let start = if self.start.is_empty() { Some(self.masses(u)) } else { None };
         let whole = within || self.steps == StepPolicy::Allow;
-        let substeps = if whole && !<S::Edge as Edge<D, S::Value>>::PRESENT {
+        let in_place = !<S::Edge as Edge<D, S::Value>>::PRESENT && self.ledger.budget == f64::INFINITY;
+        let substeps = if whole && in_place {
             let Self { discrete, stepper, t, .. } = self;
             stepper.step(*t, dt, u, discrete)?;
             1
@@ -233,6 +261,8 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
             work.clone_from(u);
             let done =
                 if whole { self.substep(&mut work, self.t, dt).map(|()| 1) } else { self.cut(&mut work, dt, limits) };
+            let done = done
+                .and_then(|substeps| self.drifted(&work, start.as_deref().unwrap_or(&self.start)).map(|()| substeps));
             if done.is_ok() {
                 std::mem::swap(u, &mut work);
             } else {
@@ -241,8 +271,10 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
             self.work = work;
             done?
         };
-        self.t = end;
+        (self.t, self.estimated) = (end, estimated);
+        self.start.extend(start.into_iter().flatten());
         let ledger = &mut self.ledger;
+        ledger.growth = growth;
         ledger.measure(self.discrete.site().particles(), u, &self.start);
         (ledger.t, ledger.dt, ledger.limit, ledger.binding) = (end, dt, limit, binding);
         (ledger.within_limit, ledger.substeps) = (within || substeps > 1, substeps);
@@ -251,10 +283,36 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         Ok(&self.ledger)
     }
 
+    /// The mass of every field.
+    fn masses(&self, u: &[S::Value]) -> Vec<f64> {
+        let mut row = LedgerRow::new(S::Value::FIELDS);
+        row.measure(self.discrete.site().particles(), u, &[]);
+        row.fields.iter().map(|field| field.mass).collect()
+    }
+
+    /// The growth rate of modes and the rate of the advection it was estimated at: anew where the flow has become twice as
+    /// fast, at the end of the step where it is at rest before.
+    fn estimate(&mut self, limits: &Limits, dt: f64) -> Result<(f64, f64)> {
+        let rate = limits.rate(Limit::Advection).fastest();
+        if self.discrete.steady() || !(rate > 2.0 * self.estimated) {
+            return Ok((self.ledger.growth, self.estimated));
+        }
+        Ok((self.discrete.growth(self.t + dt, self.growth)?, rate))
+    }
+
     /// The longest legal step, and what binds it.
     fn bound(&self, limits: &Limits) -> (f64, Option<Limit>) {
         let intervals = |limit| self.stepper.intervals(limit);
         (limits.step_within(intervals), limits.binding_within(intervals))
+    }
+
+    /// Refuses a field that has drifted from the masses at the start by more than the budget.
+    fn drifted(&self, u: &[S::Value], start: &[f64]) -> Result<()> {
+        let particles = self.discrete.site().particles();
+        let volumes = particles.volumes().ok();
+        let volume = |p: usize| volumes.and_then(|volumes| volumes.get(p).ok()).unwrap_or(1.0);
+        let strength = |p: usize, i: usize| u.get(p).map_or(0.0, |u| volume(p) * u.get(i));
+        check_drift::<D, S::Value>(particles.points(), strength, start, self.ledger.budget)
     }
 
     /// One substep of a scene, boundary values included.
@@ -282,7 +340,7 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
                 return Ok(done);
             }
             t += rest / parts;
-            limits = self.limits_at(t, u)?;
+            limits = self.limits_of(t, end - t, u)?;
         }
     }
 }

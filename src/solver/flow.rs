@@ -124,7 +124,7 @@ impl<V: Velocity<D>, X: Sync, W: FlowDivergence<D>, const D: usize> Flow<D> for 
         courant: f64,
         limits: &mut Limits,
     ) -> Result<()> {
-        let (mut distortion, mut compression) = (0.0_f64, 0.0_f64);
+        let (mut distortion, mut compression) = ((0.0, None), (0.0, None));
         let gradients = Gradients::new(&self.velocity, site, domain, t)?;
         for (p, x) in site.points().iter().enumerate() {
             let v = self.velocity.at(p, x, t);
@@ -139,10 +139,15 @@ impl<V: Velocity<D>, X: Sync, W: FlowDivergence<D>, const D: usize> Flow<D> for 
             if !divergence.is_finite() {
                 return Err(Error::from(SolverError::Divergence { value: divergence, t }).at(p));
             }
-            (distortion, compression) = (distortion.max(value), compression.max(divergence));
+            if value > distortion.0 {
+                distortion = (value, Some(p));
+            }
+            if divergence > compression.0 {
+                compression = (divergence, Some(p));
+            }
         }
-        limits.add(Limit::Distortion, Rate::frequency(distortion / courant));
-        limits.add(Limit::Compression, Rate::decay(compression));
+        limits.add_of(Limit::Distortion, Rate::frequency(distortion.0 / courant), distortion.1);
+        limits.add_of(Limit::Compression, Rate::decay(compression.0), compression.1);
         Ok(())
     }
 }
@@ -158,7 +163,7 @@ struct Gradients<'a, V, const D: usize> {
 impl<'a, V: Velocity<D>, const D: usize> Gradients<'a, V, D> {
     fn new(velocity: &'a V, site: &'a Site<D>, domain: &Domain<D>, t: f64) -> Result<Self> {
         let mut gradients = Self { velocity, site, t, made: Vec::new() };
-        if site.points().is_empty() || gradients.at(0).is_some() {
+        if V::EVERYWHERE || site.points().is_empty() {
             return Ok(gradients);
         }
         let method = DcPse::<Gradient<D>, 2>::new();
@@ -185,7 +190,7 @@ impl<'a, V: Velocity<D>, const D: usize> Gradients<'a, V, D> {
         let volume = self.site.particles().volumes().ok()?.get(p).ok()?;
         // The error of a central difference, step^2 and eps/step, is least here.
         let step = f64::EPSILON.cbrt() * (magnitude + volume.powf(1.0 / D as f64));
-        self.velocity.gradient(p, x, self.t, step)
+        Some(self.velocity.gradient(p, x, self.t, step))
     }
 }
 

@@ -1,22 +1,35 @@
 //! Whether modes of a scene grow, whatever the step.
 
 use super::fields::Fields;
+use super::moving::{Moving, MovingScene};
+use super::policy::GrowthPolicy;
 use super::scene::Scene;
 use super::semi_discrete::SemiDiscrete;
-use crate::error::{Result, SolverError};
+use crate::error::{ErrorKind, LinearError, Result, SolverError};
 use crate::linear::{Spectrum, SpectrumEstimator};
 
 /// The largest legal growth rate over the spectral radius, for `f64` rows; for `f32` what their rounding moves eigenvalues
 /// by, if that is more.
 const LIMIT: f64 = 1e-8;
 
+/// How far from the abscissa estimates end that do not converge, over the radius; see [`SpectrumEstimator`].
+const RESOLUTION: f64 = 0.002;
+
 /// Products after which the estimate is taken as it is.
 const MOST: usize = 1000;
+
+/// The same on a set that has moved: modes that are not found in so few grow too slowly to matter before the set is another.
+const ON_THE_WAY: usize = 96;
+
+/// The largest legal growth rate over the spectral radius, for rows of these fields.
+pub(super) fn legal<E: Fields>() -> f64 {
+    LIMIT.max(ROUNDING * E::EPSILON)
+}
 
 impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
     /// The rightmost eigenvalue and the spectral radius of the diffusion and advection terms at time t, conditions of the
     /// boundary included with zero values; see [`SpectrumEstimator`] for what the estimate is worth. Zero without a
-    /// product where no weight of the terms is negative, for then every eigenvalue lies in a disc left of zero.
+    /// product where the row sums of the terms say so: every eigenvalue lies in a disc left of zero then.
     ///
     /// # Errors
     /// As [`SpectrumEstimator::estimate`].
@@ -36,18 +49,54 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
         })
     }
 
+    /// The growth rate at time t as the policy wants it; NaN where nothing is to be estimated.
+    ///
+    /// # Errors
+    /// [`SolverError::Growing`] where it is refused, and as [`spectrum`](Self::spectrum).
+    pub(super) fn growth(&mut self, t: f64, policy: GrowthPolicy) -> Result<f64> {
+        match policy {
+            GrowthPolicy::Refuse => Self::check_growth(&self.spectrum(t)?),
+            GrowthPolicy::Allow => Ok(self.spectrum(t)?.abscissa),
+            GrowthPolicy::Unknown => Ok(f64::NAN),
+        }
+    }
+
     /// Refuses a spectrum with modes that are known to grow, and returns their rate otherwise.
     ///
     /// # Errors
     /// [`SolverError::Growing`].
     pub(super) fn check_growth(spectrum: &Spectrum) -> Result<f64> {
-        let limit = LIMIT.max(ROUNDING * S::Value::EPSILON);
-        // What the residual leaves open is no proof of growth.
-        if spectrum.abscissa - spectrum.residual > limit * spectrum.radius {
+        let limit = legal::<S::Value>();
+        // What the residual leaves open is no proof of growth, but estimates that did not converge are good to this too.
+        let open = spectrum.residual.min(RESOLUTION * spectrum.radius);
+        if spectrum.abscissa - open > limit * spectrum.radius {
             let (rate, radius) = (spectrum.abscissa, spectrum.radius);
             return Err(SolverError::Growing { rate, radius, limit }.into());
         }
         Ok(spectrum.abscissa)
+    }
+}
+
+impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
+    /// The growth rate of the diffusion term on the set of the start; NaN where the policy asks for none.
+    pub(super) fn growth_at_the_start(&self, policy: GrowthPolicy) -> Result<f64> {
+        self.growth(policy, MOST)
+    }
+
+    /// The same on a set that has moved; NaN also where no spectrum is found, which is no proof of growth.
+    pub(super) fn growth_on_the_way(&self, policy: GrowthPolicy) -> Result<f64> {
+        match self.growth(policy, ON_THE_WAY) {
+            Err(error) if matches!(error.kind(), ErrorKind::Linear(LinearError::NotConverged { .. })) => Ok(f64::NAN),
+            found => found,
+        }
+    }
+
+    fn growth(&self, policy: GrowthPolicy, products: usize) -> Result<f64> {
+        match policy {
+            GrowthPolicy::Unknown => Ok(f64::NAN),
+            GrowthPolicy::Allow => Ok(self.spectrum(products)?.abscissa),
+            GrowthPolicy::Refuse => SemiDiscrete::<D, S>::check_growth(&self.spectrum(products)?),
+        }
     }
 }
 

@@ -8,15 +8,15 @@ use super::moving::{Moving, MovingScene, MovingState};
 use super::moving_diffusion::{MovingDiffusion, MovingSettings};
 use super::policy::{GrowthPolicy, StepPolicy};
 use super::remeshing::{Nodes, Remesher, Remeshing, Trigger, check, overlap_is_lost};
-use super::semi_discrete::SemiDiscrete;
+use super::watch::OverlapWatch;
 use crate::apply::Report;
 use crate::domain::Domain;
-use crate::error::{Limit, Result, SolverError, TimeError};
+use crate::error::{ErrorKind, Limit, Result, SolverError, TimeError};
 use crate::kernel::MeshKernel;
 use crate::mesh::Remeshed;
 use crate::particles::Particles;
 use crate::scale::Volumes;
-use crate::time::{Entry, Plan, Stepper};
+use crate::time::{Entry, Plan, State, Stepper};
 
 /// The default constant C of the Lagrangian CFL condition dt |grad v|_2 <= C.
 pub const COURANT: f64 = 0.5;
@@ -58,8 +58,12 @@ pub struct Lagrangian<const D: usize, S: MovingScene<D>, St> {
     pub(super) stepper: St,
     policy: StepPolicy,
     courant: f64,
+    growth: GrowthPolicy,
+    /// The search of the neighbors after which growth was estimated last.
+    pub(super) surveyed: u64,
     sharp: Vec<(Limit, Rate)>,
     remesher: Option<Box<dyn Remesher<D, S::Value>>>,
+    pub(super) watch: Option<OverlapWatch<D>>,
     pub(super) ledger: LedgerRow<D>,
     /// Masses at the start.
     pub(super) start: Vec<f64>,
@@ -94,7 +98,7 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
         settings: MovingSettings,
     ) -> Result<Self> {
         let (mut moving, state) = Moving::new(scene, particles, u, domain, settings)?;
-        let (limits, report) = moving.limits(0.0, &state, COURANT)?;
+        let (limits, report) = moving.limits(0.0, 0.0, &state, COURANT)?;
         limits.possible(&stepper)?;
         if report.is_some() {
             stepper.check_symmetry(moving.symmetry(&state)?)?;
@@ -106,20 +110,20 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
             stepper,
             policy: StepPolicy::default(),
             courant: COURANT,
+            growth: settings.growth,
+            surveyed: 0,
             sharp: Vec::new(),
             remesher: None,
+            watch: None,
             ledger: LedgerRow::new(S::Value::FIELDS),
             start: Vec::new(),
             t: 0.0,
             work,
             values: Vec::new(),
         };
-        if report.is_some() && settings.growth != GrowthPolicy::Unknown {
-            let spectrum = run.moving.spectrum()?;
-            run.ledger.growth = match settings.growth {
-                GrowthPolicy::Allow => spectrum.abscissa,
-                _ => SemiDiscrete::<D, S>::check_growth(&spectrum)?,
-            };
+        if report.is_some() {
+            (run.surveyed, run.ledger.growth) =
+                (run.moving.searches().0, run.moving.growth_at_the_start(settings.growth)?);
         }
         run.certify(report.as_ref());
         run.measure();
@@ -233,17 +237,16 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
     /// # Errors
     /// Naming the particle where a coefficient is not finite or a row is illegal.
     pub fn limits(&mut self) -> Result<Limits> {
-        let Self { moving, state, t, .. } = self;
-        let (mut limits, _) = moving.limits(*t, state, self.courant)?;
-        self.sharp.iter().for_each(|&(limit, rate)| limits.set(limit, rate));
-        Ok(limits)
+        Ok(self.limits_of(self.t, 0.0, None)?.0)
     }
 
     /// Advances the run by one step, and replaces the particles where it is time.
     ///
     /// # Errors
     /// [`SolverError::Limit`] for a step above the limit, [`SolverError::Substeps`] where cutting it does not help;
-    /// [`SolverError::Volume`] naming the particle whose volume would not stay positive;
+    /// [`SolverError::Growing`] where modes of the diffusion term have come to grow since the neighbors were last searched;
+    /// [`SolverError::Volume`] naming the particle whose volume would not stay positive; [`SolverError::OverlapLost`] where it
+    /// is [watched](Self::watching); [`SolverError::Drift`] above the [`drift_budget`](Self::drift_budget);
     /// [`DomainError::Outside`](crate::DomainError::Outside) naming one that leaves the domain, and
     /// [`MeshError::Support`](crate::MeshError::Support) one whose support leaves the mesh; as [`Stepper::step`],
     /// [`MovingDiffusion::check`] and [`MovingDiffusion::rates`]. The run is then as it was.
@@ -281,20 +284,30 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(TimeError::Step { dt }.into());
         }
-        let (limits, report) = self.limits_of(self.t, None)?;
+        let (limits, report) = self.limits_of(self.t, dt, None)?;
         let (limit, binding) = (limits.step(&self.stepper), limits.binding(&self.stepper));
         let within = dt <= limit;
         if !within && self.policy == StepPolicy::Refuse {
-            return Err(SolverError::Limit { dt, limit, binding: binding.unwrap_or(Limit::Diffusion) }.into());
+            return Err(limits.refuse(dt, limit, binding));
         }
+        let searches = self.moving.searches().0;
+        let growth = match report {
+            Some(_) if searches != self.surveyed => self.moving.growth_on_the_way(self.growth)?,
+            _ => self.ledger.growth,
+        };
         let mut work = std::mem::take(&mut self.work);
-        work.clone_from(&self.state);
+        // A clone of a pair would allocate.
+        work.assign(&self.state);
         let whole = within || self.policy == StepPolicy::Allow;
         let t = self.t;
         let done =
             if whole { self.substep(&mut work, t, dt).map(|()| 1) } else { self.cut(&mut work, dt, end, limits) };
-        let done = done.and_then(|substeps| Ok((substeps, self.remeshed(&work, end)?)));
-        let (substeps, remeshed) = match done {
+        let done = done.and_then(|substeps| {
+            let remeshed = self.remeshed(&work, end)?;
+            let overlap = self.watched(&work, end, remeshed.as_ref().map(|(fresh, _)| fresh))?;
+            Ok((substeps, remeshed, overlap))
+        });
+        let (substeps, remeshed, overlap) = match done {
             Ok(done) => done,
             Err(error) => {
                 self.work = work;
@@ -302,12 +315,15 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
                 return Err(error);
             }
         };
+        self.surveyed = searches;
         match remeshed {
             None => self.work = std::mem::replace(&mut self.state, work),
             Some((fresh, kept)) => {
                 self.work = work;
                 let Remeshed { particles, strengths, dropped } = fresh;
                 self.state = self.moving.replace(particles, strengths, kept)?;
+                // What a mesh leaves is as regular as can be.
+                self.surveyed = self.moving.searches().0;
                 self.stepper.reset();
                 self.ledger.remeshings += 1;
                 for (i, totals) in self.ledger.fields.iter_mut().enumerate() {
@@ -317,19 +333,28 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
             }
         }
         self.t = end;
+        if let Some(overlap) = overlap {
+            (self.ledger.hole, self.ledger.gap) = overlap;
+        }
         self.certify(report.as_ref());
         self.measure();
         let ledger = &mut self.ledger;
-        (ledger.t, ledger.dt, ledger.limit, ledger.binding) = (end, dt, limit, binding);
+        (ledger.t, ledger.dt, ledger.limit, ledger.binding, ledger.growth) = (end, dt, limit, binding, growth);
         (ledger.within_limit, ledger.substeps) = (within || substeps > 1, substeps);
         ledger.step += 1;
         ledger.retries += u64::from(substeps) - 1;
         Ok(&self.ledger)
     }
 
-    /// What bounds a step from a state at time t, by default that of the run, and what the check of the rows found.
-    fn limits_of(&mut self, t: f64, state: Option<&MovingState<D, S::Value>>) -> Result<(Limits, Option<Report>)> {
-        let (mut limits, report) = self.moving.limits(t, state.unwrap_or(&self.state), self.courant)?;
+    /// What bounds a step of length dt from a state at time t, by default that of the run, and what the check of the rows
+    /// found.
+    fn limits_of(
+        &mut self,
+        t: f64,
+        dt: f64,
+        state: Option<&MovingState<D, S::Value>>,
+    ) -> Result<(Limits, Option<Report>)> {
+        let (mut limits, report) = self.moving.limits(t, dt, state.unwrap_or(&self.state), self.courant)?;
         self.sharp.iter().for_each(|&(limit, rate)| limits.set(limit, rate));
         Ok((limits, report))
     }
@@ -365,7 +390,7 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
                 return Ok(done);
             }
             t += rest / parts;
-            limits = self.limits_of(t, Some(work))?.0;
+            limits = self.limits_of(t, end - t, Some(work))?.0;
         }
     }
 
@@ -383,10 +408,10 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
                 self.moving.place(t, work)?;
                 overlap_is_lost(remesher.mesh(), self.moving.site.particles(), &self.moving.domain, hole, gap)?
             }
-            Trigger::Condition(limit) => match self.moving.limits(t, work, self.courant) {
+            Trigger::Condition(limit) => match self.moving.limits(t, 0.0, work, self.courant) {
                 Ok((_, report)) => report.is_some_and(|report| report.condition > limit),
                 // Rows that are refused are worse than those that are not.
-                Err(error) if matches!(error.kind(), crate::error::ErrorKind::Operator(_)) => true,
+                Err(error) if matches!(error.kind(), ErrorKind::Operator(_)) => true,
                 Err(error) => return Err(error),
             },
         };

@@ -53,6 +53,8 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
             volumes: self.volumes().to_vec(),
             searches,
             searched_at: searched_at.as_flattened().to_vec(),
+            surveyed: self.surveyed,
+            growth: Some(self.ledger.growth).filter(|growth| !growth.is_nan()),
             stepper: self.stepper.clone(),
         }
     }
@@ -83,8 +85,9 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
         let particles = Particles::new(points)?.with_volumes(Volumes::each(saved.volumes)?)?;
         let kept = self.moving.resumed(&particles, saved.searched_at.as_chunks().0, saved.searches)?;
         self.state = self.moving.replace(particles, saved.strengths, kept)?;
-        (self.t, self.start, self.stepper) = (saved.t, saved.start, saved.stepper);
+        (self.t, self.start, self.stepper, self.surveyed) = (saved.t, saved.start, saved.stepper, saved.surveyed);
         let ledger = &mut self.ledger;
+        ledger.growth = saved.growth.unwrap_or(f64::NAN);
         (ledger.t, ledger.step, ledger.retries) = (saved.t, saved.step, saved.retries);
         ledger.remeshings = saved.remeshings;
         for (i, totals) in ledger.fields.iter_mut().enumerate() {

@@ -121,7 +121,8 @@ pub struct LedgerRow<const D: usize> {
     pub substeps: u32,
     /// Substeps beyond the first, summed over the run.
     pub retries: u64,
-    /// The largest growth rate of a mode, in 1/time, estimated when the rows were made; NaN where nothing was estimated.
+    /// The largest growth rate of a mode, in 1/time, estimated when the rows were made, on moving particles when their
+    /// neighbors were searched last; NaN where nothing was estimated.
     pub growth: f64,
     /// Worst condition number of a moment system in use.
     pub condition: f64,
@@ -131,6 +132,13 @@ pub struct LedgerRow<const D: usize> {
     pub remeshings: u64,
     /// How often the neighbors of moving particles were searched anew so far, remeshings included.
     pub rebuilds: u64,
+    /// The largest hole when it was measured last, in spacings of the mesh, see [`OverlapWatch`](super::OverlapWatch); NaN
+    /// where nobody asked.
+    pub hole: f64,
+    /// The least gap then.
+    pub gap: f64,
+    /// The largest legal |drift| over size; infinite where none is set.
+    pub budget: f64,
     /// The totals, field by field.
     pub fields: Vec<Totals<D>>,
 }
@@ -152,6 +160,9 @@ impl<const D: usize> LedgerRow<D> {
             residual: 0.0,
             remeshings: 0,
             rebuilds: 0,
+            hole: f64::NAN,
+            gap: f64::NAN,
+            budget: f64::INFINITY,
             fields: vec![Totals::NOTHING; fields],
         }
     }
@@ -203,7 +214,7 @@ impl<const D: usize> Ledger<D> {
 
     fn write_to(&self, out: &mut impl Write) -> io::Result<()> {
         write!(out, "step,t,dt,limit,binding,within_limit,substeps,retries,growth,condition,residual")?;
-        write!(out, ",remeshings,rebuilds")?;
+        write!(out, ",remeshings,rebuilds,hole,gap,budget")?;
         for i in 0..self.rows.first().map_or(0, |row| row.fields.len()) {
             for name in ["mass", "size", "min", "max", "negative_mass", "drift", "dropped", "dropped_size"] {
                 write!(out, ",{name}_{i}")?;
@@ -230,6 +241,7 @@ impl<const D: usize> LedgerRow<D> {
         write!(out, ",{},{},{:e}", self.substeps, self.retries, self.growth)?;
         write!(out, ",{:e},{:e}", self.condition, self.residual)?;
         write!(out, ",{},{}", self.remeshings, self.rebuilds)?;
+        write!(out, ",{:e},{:e},{:e}", self.hole, self.gap, self.budget)?;
         for field in &self.fields {
             let Totals { mass, size, min, max, negative_mass, drift, dropped, dropped_size, .. } = field;
             write!(out, ",{mass:e},{size:e},{min:e},{max:e},{negative_mass:e},{drift:e},{dropped:e},{dropped_size:e}")?;

@@ -1,6 +1,6 @@
 //! What bounds the next step, term by term.
 
-use crate::error::{Limit, Result, SolverError};
+use crate::error::{Error, Limit, Result, SolverError};
 use crate::time::{State, Stepper};
 
 /// How fast the modes of one term decay and oscillate, and the longest step it bears whatever the stepper.
@@ -43,14 +43,24 @@ impl Rate {
         Self { frequency, ..Self::NONE }
     }
 
+    /// The largest bound on a modulus.
+    pub(super) fn fastest(self) -> f64 {
+        self.decay.max(self.oscillation).max(self.modulus)
+    }
+
+    /// The largest number in it.
+    fn most(self) -> f64 {
+        self.fastest().max(self.frequency)
+    }
+
     /// The larger of each.
     #[must_use]
     pub fn larger(self, other: Self) -> Self {
         Self {
-            decay: self.decay.max(other.decay),
-            oscillation: self.oscillation.max(other.oscillation),
-            modulus: self.modulus.max(other.modulus),
-            frequency: self.frequency.max(other.frequency),
+            decay: larger(self.decay, other.decay),
+            oscillation: larger(self.oscillation, other.oscillation),
+            modulus: larger(self.modulus, other.modulus),
+            frequency: larger(self.frequency, other.frequency),
         }
     }
 }
@@ -82,6 +92,8 @@ impl Rate {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Limits {
     rates: [Rate; Limit::ALL.len()],
+    /// Who sets them, where that is one particle.
+    setters: [Option<usize>; Limit::ALL.len()],
 }
 
 impl Limits {
@@ -91,12 +103,49 @@ impl Limits {
         own.decay += rate.decay;
         own.oscillation += rate.oscillation;
         own.modulus += rate.modulus;
-        own.frequency = own.frequency.max(rate.frequency);
+        own.frequency = larger(own.frequency, rate.frequency);
+    }
+
+    /// The same for a rate that one particle sets; it is named where that rate is the largest of its kind.
+    pub fn add_of(&mut self, limit: Limit, rate: Rate, particle: Option<usize>) {
+        if rate.most() > self.rate(limit).most() {
+            self.setters[limit as usize] = particle;
+        }
+        self.add(limit, rate);
     }
 
     /// Puts a rate in the place of what was known, such as a sharp eigenvalue in that of a bound.
     pub fn set(&mut self, limit: Limit, rate: Rate) {
         self.rates[limit as usize] = rate;
+        self.setters[limit as usize] = None;
+    }
+
+    /// The particle that sets the rate of one kind, where it is known: that of distortion, compression and source.
+    pub fn particle(&self, limit: Limit) -> Option<usize> {
+        self.setters[limit as usize]
+    }
+
+    /// The refusal of a step, naming the particle that sets the limit where it is known.
+    pub(super) fn refuse(&self, dt: f64, limit: f64, binding: Option<Limit>) -> Error {
+        let binding = binding.unwrap_or(Limit::Diffusion);
+        let error = Error::from(SolverError::Limit { dt, limit, binding });
+        match self.particle(binding) {
+            Some(p) => error.at(p),
+            None => error,
+        }
+    }
+
+    /// The larger rates, kind by kind.
+    #[must_use]
+    pub fn larger(&self, other: &Self) -> Self {
+        let mut all = *self;
+        for (i, rate) in other.rates.iter().enumerate() {
+            if rate.most() > all.rates[i].most() {
+                all.setters[i] = other.setters[i];
+            }
+            all.rates[i] = all.rates[i].larger(*rate);
+        }
+        all
     }
 
     /// The rate of one kind.
@@ -111,8 +160,8 @@ impl Limits {
 
     /// The longest legal step where modes of each kind are stable on these intervals (x, y).
     pub fn step_within(&self, intervals: impl Fn(Limit) -> (f64, f64)) -> f64 {
-        let shares = Limit::ALL.iter().fold(0.0, |sum, &limit| sum + share(self.rate(limit), intervals(limit)));
-        1.0 / self.rates.iter().fold(shares, |most: f64, rate| most.max(rate.frequency))
+        let shares = Limit::ALL.iter().fold(0.0, |sum, &limit| sum + share(limit, self.rate(limit), intervals(limit)));
+        1.0 / self.rates.iter().fold(shares, |most: f64, rate| most.max(known(rate.frequency)))
     }
 
     /// The kind with the largest share in the limit; `None` where nothing binds.
@@ -122,7 +171,10 @@ impl Limits {
 
     /// The same where modes of each kind are stable on these intervals (x, y).
     pub fn binding_within(&self, intervals: impl Fn(Limit) -> (f64, f64)) -> Option<Limit> {
-        let weigh = |limit: &Limit| share(self.rate(*limit), intervals(*limit)).max(self.rate(*limit).frequency);
+        let weigh = |limit: &Limit| {
+            let rate = self.rate(*limit);
+            share(*limit, rate, intervals(*limit)).max(known(rate.frequency))
+        };
         let most = Limit::ALL.into_iter().rev().max_by(|a, b| weigh(a).total_cmp(&weigh(b)))?;
         (weigh(&most) > 0.0).then_some(most)
     }
@@ -130,11 +182,11 @@ impl Limits {
     /// Refuses a step above the limit.
     ///
     /// # Errors
-    /// [`SolverError::Limit`] with the limit and what binds it.
+    /// [`SolverError::Limit`] with the limit and what binds it, naming the particle that sets it where it is known.
     pub fn check<S: State>(&self, dt: f64, stepper: &(impl Stepper<S> + ?Sized)) -> Result<()> {
         let limit = self.step(stepper);
         match self.binding(stepper) {
-            Some(binding) if !(dt <= limit) => Err(SolverError::Limit { dt, limit, binding }.into()),
+            Some(binding) if !(dt <= limit) => Err(self.refuse(dt, limit, Some(binding))),
             _ => Ok(()),
         }
     }
@@ -157,7 +209,7 @@ impl Limits {
     /// # Errors
     /// As [`possible`](Self::possible).
     pub fn possible_within(&self, intervals: impl Fn(Limit) -> (f64, f64)) -> Result<()> {
-        let impossible = |&limit: &Limit| share(self.rate(limit), intervals(limit)).is_infinite();
+        let impossible = |&limit: &Limit| share(limit, self.rate(limit), intervals(limit)).is_infinite();
         let Some(term) = Limit::ALL.into_iter().find(impossible) else { return Ok(()) };
         let (Rate { decay, oscillation, modulus, .. }, (negative_real, imaginary)) = (self.rate(term), intervals(term));
         let (decay, oscillation) = (decay + modulus, oscillation + modulus);
@@ -172,7 +224,23 @@ fn of<S: State>(stepper: &(impl Stepper<S> + ?Sized)) -> impl Fn(Limit) -> (f64,
 }
 
 /// a/x + b/y + c/(0.93 min(x, y)), in 1/time.
-fn share(rate: Rate, (x, y): (f64, f64)) -> f64 {
-    let part = |rate: f64, interval: f64| if rate > 0.0 { rate / interval } else { 0.0 };
-    part(rate.decay, x) + part(rate.oscillation, y) + part(rate.modulus, HALF_DISC * x.min(y))
+fn share(limit: Limit, rate: Rate, (x, y): (f64, f64)) -> f64 {
+    let part = |rate: f64, interval: f64| {
+        let binds = known(rate) > 0.0 && interval.is_finite();
+        if binds { known(rate) / interval } else { 0.0 }
+    };
+    // Where nothing that oscillates is stable, that of a source grows by the error of the scheme, (rate dt)^2/2 a step for
+    // Euler, and no finer with the particles: what decays is bounded there.
+    let reach = if limit == Limit::Source && y == 0.0 { x } else { HALF_DISC * x.min(y) };
+    part(rate.decay, x) + part(rate.oscillation, y) + part(rate.modulus, reach)
+}
+
+/// The larger of two rates, NaN being the largest of all.
+fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
+}
+
+/// A rate that is no number allows no step.
+fn known(rate: f64) -> f64 {
+    if rate.is_nan() { f64::INFINITY } else { rate }
 }

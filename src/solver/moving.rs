@@ -5,13 +5,14 @@ use super::flow::Flow;
 use super::limits::{Limits, Rate};
 use super::moving_diffusion::{MovingDiffusion, MovingSettings};
 use super::scene::Scene;
+use super::symmetry::{probes, symmetry};
 use super::term::{SceneTerm, Site};
 use crate::apply::Report;
 use crate::apply::blocks::each_row;
 use crate::domain::Domain;
 use crate::error::{Error, Limit, Result, SolverError, TimeError};
 use crate::linear::Spectrum;
-use crate::particles::{Particles, Random};
+use crate::particles::Particles;
 use crate::scale::Volumes;
 use crate::time::{Entry, RowSymmetry};
 
@@ -255,10 +256,12 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         Ok(())
     }
 
-    /// What bounds a step from this state, and what the check of the diffusion rows found.
+    /// What bounds a step of length dt from this state, the flow at both ends of it, and what the check of the diffusion rows
+    /// found.
     pub(super) fn limits(
         &mut self,
         t: f64,
+        dt: f64,
         state: &MovingState<D, S::Value>,
         courant: f64,
     ) -> Result<(Limits, Option<Report>)> {
@@ -276,6 +279,11 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         }
         let flow = self.scene.advection_term();
         flow.bound(&self.values, &self.site, &self.domain, t, courant, &mut limits)?;
+        if dt > 0.0 && !SceneTerm::<D, S::Value>::steady(flow) {
+            let mut end = Limits::default();
+            flow.bound(&self.values, &self.site, &self.domain, t + dt, courant, &mut end)?;
+            limits = limits.larger(&end);
+        }
         if checked.is_none() {
             // Expansion adds to the decay of what diffuses (eq. 7.11); by themselves strengths and volumes bear any.
             limits.set(Limit::Compression, Rate::default());
@@ -286,38 +294,20 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         Ok((limits, checked.map(|(report, _)| report)))
     }
 
-    /// The rightmost eigenvalue and the spectral radius of the diffusion rows of now.
-    pub(super) fn spectrum(&self) -> Result<Spectrum> {
-        self.scene.diffusion_term().spectrum(&self.kept, &self.site)
+    /// The rightmost eigenvalue and the spectral radius of the diffusion rows of now, in so many products each.
+    pub(super) fn spectrum(&self, products: usize) -> Result<Spectrum> {
+        self.scene.diffusion_term().spectrum(&self.kept, &self.site, products)
     }
 
     /// Whether V_p w_pq = V_q w_qp in the rows of now, found by applying them to two fields.
     pub(super) fn symmetry(&self, state: &MovingState<D, S::Value>) -> Result<RowSymmetry> {
-        /// Rounding of a row and of the sum over all, in eps of the absolute terms; rows of DC-PSE miss it by percents.
-        const ROUNDING: f64 = 1e4;
-        let (points, mut random) = (self.site.points(), Random::new(1));
-        let mut field = || {
-            let mut one = || {
-                let mut u = S::Value::ZERO;
-                u.set(0, random.uniform() - 0.5);
-                u
-            };
-            points.iter().map(|_| one()).collect::<Vec<_>>()
-        };
-        let (a, b) = (field(), field());
-        let mut images = [a.clone(), b.clone()];
-        for (u, out) in [&a, &b].into_iter().zip(&mut images) {
-            self.scene.diffusion_term().rates(&self.kept, &self.site, u, out, |_, rate| rate)?;
+        let fields = probes::<S::Value>(self.site.points().len());
+        let mut images = fields.clone();
+        for (u, image) in fields.iter().zip(&mut images) {
+            self.scene.diffusion_term().rates(&self.kept, &self.site, u, image, |_, rate| rate)?;
         }
-        let (mut defect, mut size) = (0.0, 0.0);
-        for (p, volume) in self.volume(state).iter().enumerate() {
-            let of = |u: &[S::Value], image: &[S::Value]| volume * u[p].get(0) * image[p].get(0);
-            let (ab, ba) = (of(&a, &images[1]), of(&b, &images[0]));
-            defect += ab - ba;
-            size += ab.abs() + ba.abs();
-        }
-        let symmetric = defect.abs() <= ROUNDING * S::Value::EPSILON * size;
-        Ok(if symmetric { RowSymmetry::Symmetric } else { RowSymmetry::General })
+        let volumes = self.volume(state);
+        Ok(symmetry(&fields, &images, |p| volumes.get(p).copied().unwrap_or(1.0)))
     }
 }
 

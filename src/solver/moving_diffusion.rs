@@ -3,6 +3,7 @@
 use super::coefficient::{Diffusivity, diffusivities};
 use super::diffusion::{Diffusion, check_contrast};
 use super::fields::Fields;
+use super::growth::legal;
 use super::policy::GrowthPolicy;
 use super::term::Site;
 use crate::apply::blocks::each_row;
@@ -28,7 +29,8 @@ pub struct MovingSettings {
     pub cutoff: Option<f64>,
     /// The skin of the list; by default 0.15 of its reach, or less in a narrow domain.
     pub skin: Option<f64>,
-    /// What is done about modes of the diffusion term that grow on the set of the start; later sets are not looked at.
+    /// What is done about modes of the diffusion term that grow: on the set of the start, and on every set whose neighbors
+    /// were searched anew because it has moved (not on a fresh mesh).
     pub growth: GrowthPolicy,
 }
 
@@ -83,12 +85,12 @@ pub trait MovingDiffusion<const D: usize, E: Fields>: Sync {
     /// Naming the particle whose row is illegal.
     fn check(&self, kept: &Self::Kept, site: &Site<D>, u: &[E], out: &mut [E]) -> Result<Option<(Report, f64)>>;
 
-    /// The rightmost eigenvalue and the spectral radius of the rows of now; zero without a product where no weight is
-    /// negative.
+    /// The rightmost eigenvalue and the spectral radius of the rows of now, each in at most so many products; zero without
+    /// one where no weight is negative.
     ///
     /// # Errors
     /// As [`Rows::assemble`] and [`SpectrumEstimator::estimate`].
-    fn spectrum(&self, kept: &Self::Kept, site: &Site<D>) -> Result<Spectrum>;
+    fn spectrum(&self, kept: &Self::Kept, site: &Site<D>, products: usize) -> Result<Spectrum>;
 
     /// Writes `finish`(p, div(D grad u)_p) for every particle.
     ///
@@ -143,7 +145,7 @@ impl<const D: usize, E: Fields> MovingDiffusion<D, E> for () {
         Ok(None)
     }
 
-    fn spectrum(&self, (): &(), _: &Site<D>) -> Result<Spectrum> {
+    fn spectrum(&self, (): &(), _: &Site<D>, _: usize) -> Result<Spectrum> {
         Ok(Spectrum::default())
     }
 
@@ -256,13 +258,14 @@ impl<C: Diffusivity<D>, M: MovingMethod<D>, const D: usize, E: Fields> MovingDif
         Ok(Some((report, factor)))
     }
 
-    fn spectrum(&self, kept: &MovingRows<D, M>, site: &Site<D>) -> Result<Spectrum> {
+    fn spectrum(&self, kept: &MovingRows<D, M>, site: &Site<D>, products: usize) -> Result<Spectrum> {
         let within = kept.within();
         match self.diffusivity.constant() {
-            Some(factor) => spectrum(&kept.method, &within, factor),
+            Some(factor) => spectrum(&kept.method, &within, factor, products),
             None => {
                 let values = diffusivities(&self.diffusivity, site.points())?;
-                spectrum(&DivGrad::new(kept.method.clone(), values)?.mean(self.mean), &within, 1.0)
+                let method = DivGrad::new(kept.method.clone(), values)?.mean(self.mean);
+                spectrum(&method, &within, 1.0, products)
             }
         }
     }
@@ -291,20 +294,18 @@ impl<C: Diffusivity<D>, M: MovingMethod<D>, const D: usize, E: Fields> MovingDif
     }
 }
 
-/// Products after which an estimate of the spectrum is taken as it is.
-const MOST: usize = 1000;
-
 /// The spectrum of the rows times a factor, from rows that are stored for it.
 fn spectrum<const D: usize, M: Method<D, Out = [f64; 1]>>(
     method: &M,
     neighbors: &Within<'_, D>,
     factor: f64,
+    products: usize,
 ) -> Result<Spectrum> {
     let rows = Rows::<[f64; 1]>::assemble(method, neighbors)?;
-    if rows.report().negative_weights == 0 {
+    if rows.cannot_grow(legal::<f64>()) {
         return Ok(Spectrum::default());
     }
-    SpectrumEstimator::new().most(MOST).estimate(neighbors.targets(), |u, du| {
+    SpectrumEstimator::new().most(products).estimate(neighbors.targets(), |u, du| {
         rows.apply(u, du)?;
         du.iter_mut().for_each(|du| *du *= factor);
         Ok(())

@@ -7,7 +7,8 @@ pub enum StepPolicy {
     /// It is refused before anything changes.
     #[default]
     Refuse,
-    /// It is cut into substeps, each within the limit of its own moment; the ledger counts them.
+    /// It is cut into substeps, each within the limit of its own moment; the ledger counts them. Remeshing waits for the
+    /// end of the step, and finds the set as distorted as the whole step leaves it.
     Adapt {
         /// The most substeps of one step; where more are needed the step is refused.
         most: u32,

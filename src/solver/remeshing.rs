@@ -18,6 +18,9 @@ pub enum Trigger {
     /// When overlap is lost: as soon as the largest hole ([`fill_distance`]) is wider than `hole` or the least gap
     /// ([`least_gap`]) narrower than `gap`, both in spacings of the mesh. A fresh mesh has a hole of sqrt(D)/2 and a gap of
     /// 1; the number of neighbors shows neither.
+    ///
+    /// It keeps a set fit for its operators. It does not converge: between two remeshings particles are distorted by as
+    /// much whatever h, and the field they deposit misses by as much. Orders need remeshing after a fixed number of steps.
     Overlap {
         /// The largest legal hole, above sqrt(D)/2.
         hole: f64,
@@ -134,14 +137,30 @@ pub(super) fn overlap_is_lost<const D: usize>(
     hole: f64,
     gap: f64,
 ) -> Result<bool> {
-    let (least, widest) = mesh.spacings().iter().fold((f64::INFINITY, 0.0_f64), |(l, w), &h| (l.min(h), w.max(h)));
+    let (least, widest) = spacings(mesh);
     if least_gap(&CellList::build(particles, domain, Cutoff(gap * least))?) < gap * least {
         return Ok(true);
     }
+    Ok(hole_of(mesh, particles, domain, hole)? > hole * widest)
+}
+
+/// The smallest and the largest spacing of a mesh.
+pub(super) fn spacings<const D: usize>(mesh: &Mesh<D>) -> (f64, f64) {
+    mesh.spacings().iter().fold((f64::INFINITY, 0.0_f64), |(l, w), &h| (l.min(h), w.max(h)))
+}
+
+/// The largest hole, seen from the nodes of a mesh and the middles of its cells, as long as it is not above three times
+/// `hole` spacings.
+pub(super) fn hole_of<const D: usize>(
+    mesh: &Mesh<D>,
+    particles: &Particles<D>,
+    domain: &Domain<D>,
+    hole: f64,
+) -> Result<f64> {
     let half = mesh.spacings().map(|h| 0.5 * h);
     let middle = |x: [f64; D]| std::array::from_fn(|axis| x[axis] + half[axis]);
     let inside = |x: [f64; D]| domain.wrap(&x).ok();
     let probes: Vec<[f64; D]> = mesh.points().flat_map(|x| [x, middle(x)]).filter_map(inside).collect();
-    let sight = Cutoff(SIGHT * hole * widest);
-    Ok(fill_distance(&CellList::build_at(&probes, particles, domain, sight)?) > hole * widest)
+    let sight = Cutoff(SIGHT * hole * spacings(mesh).1);
+    Ok(fill_distance(&CellList::build_at(&probes, particles, domain, sight)?))
 }

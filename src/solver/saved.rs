@@ -54,6 +54,10 @@ pub struct SavedParticles<E, St> {
     pub searches: u64,
     /// The coordinates of all particles when they were; empty without diffusion.
     pub searched_at: Vec<f64>,
+    /// The search after which growth was estimated last.
+    pub surveyed: u64,
+    /// The growth rate found then, in 1/time; `None` where nothing was estimated.
+    pub growth: Option<f64>,
     /// The stepper.
     pub stepper: St,
 }

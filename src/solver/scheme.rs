@@ -4,6 +4,7 @@ use super::fields::Fields;
 use super::scene::Scene;
 use super::semi_discrete::SemiDiscrete;
 use crate::error::{Limit, Result};
+use crate::linear::{BiCgStab, CsrMatrix, SolveReport, SparseSolver};
 use crate::time::{Euler, Implicit, Leapfrog, Rk4, RowSymmetry, SspRk3, Stepper};
 
 /// What moves a scene in time. Every [`Stepper`] does, and [`ImplicitScheme`].
@@ -76,28 +77,60 @@ stages!(Euler 1 Leapfrog 1 SspRk3 3 Rk4 4);
 #[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct ImplicitScheme<E: Fields = f64> {
     theta: f64,
+    lu_rows: usize,
     /// Matrix and factors, made anew after saving or cloning.
     #[cfg_attr(feature = "serde", serde(skip))]
     held: Option<Implicit<E>>,
     #[cfg_attr(feature = "serde", serde(skip))]
     before: Vec<E>,
+    #[cfg_attr(feature = "serde", serde(skip))]
+    solved: SolveReport,
 }
 
 impl<E: Fields> Clone for ImplicitScheme<E> {
     fn clone(&self) -> Self {
-        Self { theta: self.theta, held: None, before: Vec::new() }
+        Self { lu_rows: self.lu_rows, ..Self::new(self.theta) }
     }
 }
 
 impl<E: Fields> ImplicitScheme<E> {
     /// Implicit Euler.
     pub fn euler() -> Self {
-        Self { theta: 1.0, held: None, before: Vec::new() }
+        Self::new(1.0)
     }
 
     /// Crank-Nicolson.
     pub fn crank_nicolson() -> Self {
-        Self { theta: 0.5, held: None, before: Vec::new() }
+        Self::new(0.5)
+    }
+
+    fn new(theta: f64) -> Self {
+        let (lu_rows, solved) = (Implicit::<E>::LU_ROWS, SolveReport::default());
+        Self { theta, lu_rows, held: None, before: Vec::new(), solved }
+    }
+
+    /// With sparse LU up to so many particles, [`Implicit::LU_ROWS`] by default, and BiCGSTAB beyond. Without the feature
+    /// `faer` there is no LU, and this has no effect.
+    #[must_use]
+    pub fn lu_up_to(self, rows: usize) -> Self {
+        Self { lu_rows: rows, held: None, ..self }
+    }
+
+    /// What the solve of the last step did, summed over the fields; nothing before the first.
+    pub fn last_solve(&self) -> SolveReport {
+        self.solved
+    }
+
+    /// The scheme with this matrix.
+    fn implicit(&self, matrix: CsrMatrix) -> Result<Implicit<E>> {
+        let rows = matrix.rows();
+        let scheme = if self.theta == 1.0 { Implicit::euler(matrix)? } else { Implicit::crank_nicolson(matrix)? };
+        #[cfg(feature = "faer")]
+        if rows <= self.lu_rows {
+            return Ok(scheme.solver(SparseSolver::lu));
+        }
+        let _ = rows;
+        Ok(scheme.solver(|matrix| SparseSolver::bicgstab(matrix, BiCgStab::new())))
     }
 }
 
@@ -113,25 +146,25 @@ impl<S: Scene<D, Value = E>, E: Fields, const D: usize> TimeScheme<D, S> for Imp
     }
 
     fn step(&mut self, t: f64, dt: f64, u: &mut Vec<E>, discrete: &mut SemiDiscrete<D, S>) -> Result<()> {
-        let at = t + self.theta * dt;
+        // Inflow may begin or end within a step: it is taken where the step ends.
+        let (at, end) = (t + self.theta * dt, t + dt);
         let mut implicit = match self.held.take() {
             Some(implicit) if discrete.steady() => implicit,
             Some(mut implicit) => {
-                implicit.set_matrix(discrete.matrix(at)?)?;
-                implicit.algebraic(discrete.prescribed(t + dt))?
+                implicit.set_matrix(discrete.matrix_with(at, end, |_| 0.0)?)?;
+                implicit.algebraic(discrete.prescribed(end))?
             }
             None => {
-                let matrix = discrete.matrix(at)?;
-                let scheme =
-                    if self.theta == 1.0 { Implicit::euler(matrix)? } else { Implicit::crank_nicolson(matrix)? };
-                scheme.algebraic(discrete.prescribed(t + dt))?
+                let scheme = self.implicit(discrete.matrix_with(at, end, |_| 0.0)?)?;
+                scheme.algebraic(discrete.prescribed(end))?
             }
         };
         self.before.clone_from(u);
         let before = &self.before;
-        let done = implicit.step(t, dt, u, &mut |t, g| discrete.load(t, before, g));
+        let done = implicit.step(t, dt, u, &mut |t, g| discrete.load_with(t, end, before, g));
         self.held = Some(implicit);
-        done.map(|_| ())
+        self.solved = done?;
+        Ok(())
     }
 
     fn reset(&mut self) {

@@ -6,13 +6,14 @@ use super::fields::Fields;
 use super::limits::Limits;
 use super::policy::GrowthPolicy;
 use super::scene::Scene;
+use super::symmetry::{probes, symmetry};
 use super::term::{SceneTerm, Site};
 use crate::apply::Report;
 use crate::apply::blocks::each_row;
 use crate::error::{Result, TimeError};
 use crate::linear::CsrMatrix;
 use crate::neighbors::Neighbors;
-use crate::particles::{Particles, Random};
+use crate::particles::Particles;
 use crate::time::RowSymmetry;
 
 /// A scene on a particle set: its rows, made once, and du/dt at any time. Absent terms take no room in it.
@@ -27,9 +28,6 @@ pub struct SemiDiscrete<const D: usize, S: Scene<D>> {
     source: SourceRowsOf<D, S>,
     edge: <S::Edge as Edge<D, S::Value>>::State,
 }
-
-/// Rounding of a row and of the sum over all, in eps of the absolute terms; rows of DC-PSE miss symmetry by percents.
-const ROUNDING: f64 = 1e4;
 
 type DiffusionRowsOf<const D: usize, S> = <<S as Scene<D>>::Diffusion as SceneTerm<D, <S as Scene<D>>::Value>>::Rows;
 type AdvectionRowsOf<const D: usize, S> = <<S as Scene<D>>::Advection as SceneTerm<D, <S as Scene<D>>::Value>>::Rows;
@@ -120,7 +118,7 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
         });
     }
 
-    /// Whether no term can have a growing mode, because none has a negative weight.
+    /// Whether no term can have a growing mode, by its row sums.
     pub(super) fn cannot_grow(&self) -> bool {
         let terms = self.scene.diffusion_term().monotone(&self.diffusion)
             && self.scene.advection_term().monotone(&self.advection);
@@ -184,31 +182,30 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
     /// # Errors
     /// As [`CsrMatrix::from_triplets`].
     pub fn matrix(&mut self, t: f64) -> Result<CsrMatrix> {
-        self.matrix_with(t, |_| 0.0)
+        self.matrix_with(t, t, |_| 0.0)
     }
 
-    /// The same with a diagonal of its own added inside.
-    pub(super) fn matrix_with(&mut self, t: f64, own: impl Fn(usize) -> f64) -> Result<CsrMatrix> {
+    /// The same with the values of another time prescribed, and a diagonal of its own added inside.
+    pub(super) fn matrix_with(&mut self, t: f64, given: f64, own: impl Fn(usize) -> f64) -> Result<CsrMatrix> {
         self.scene.advection_term().refresh(&mut self.advection, &self.site, t, &[])?;
         let points = self.site.points();
         let mut prescribed = vec![false; points.len()];
-        self.each_prescribed(t, |p| {
+        self.each_prescribed(given, |p| {
             if let Some(prescribed) = prescribed.get_mut(p) {
                 *prescribed = true;
             }
         });
-        let mut triplets = Vec::new();
-        for (p, x) in points.iter().enumerate() {
+        let row = |p: usize, entries: &mut Vec<(usize, f64)>| {
             if prescribed[p] {
-                triplets.push((p, p, 1.0));
-                continue;
+                entries.push((p, 1.0));
+                return;
             }
-            let mut entry = |q: usize, value: f64| triplets.push((p, q, value));
+            let (x, mut entry) = (&points[p], |q: usize, value: f64| entries.push((q, value)));
             self.scene.diffusion_term().entries(&self.diffusion, p, x, t, &mut entry);
             self.scene.advection_term().entries(&self.advection, p, x, t, &mut entry);
             entry(p, own(p));
-        }
-        let mut matrix = CsrMatrix::from_triplets(points.len(), points.len(), triplets)?;
+        };
+        let mut matrix = CsrMatrix::from_rows(points.len(), points.len(), row)?;
         if let Some(rows) = self.scene.edge().rows(&self.edge) {
             rows.replace_in(&mut matrix)?;
         }
@@ -226,6 +223,11 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
     /// # Errors
     /// [`TimeError::Shape`] for another number of particles.
     pub fn load(&mut self, t: f64, u: &[S::Value], out: &mut [S::Value]) -> Result<()> {
+        self.load_with(t, t, u, out)
+    }
+
+    /// The same with the values of another time prescribed.
+    pub(super) fn load_with(&mut self, t: f64, given: f64, u: &[S::Value], out: &mut [S::Value]) -> Result<()> {
         let needed = self.site.points().len();
         if let Some(found) = [u.len(), out.len()].into_iter().find(|&found| found != needed) {
             return Err(TimeError::Shape { found, needed }.into());
@@ -234,7 +236,7 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
         for ((p, x), out) in points.iter().enumerate().zip(&mut *out) {
             *out = self.scene.source_term().rate(&self.source, p, x, t, u, S::Value::ZERO);
         }
-        self.each_prescribed(t, |p| {
+        self.each_prescribed(given, |p| {
             if let (Some(out), Some(x)) = (out.get_mut(p), points.get(p)) {
                 *out = self.scene.edge().value(p, x, t);
             }
@@ -245,31 +247,15 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
     /// Whether V_p w_pq = V_q w_qp in the rows of the diffusion term, found by applying them to two fields; a boundary
     /// breaks it. Without a diffusion term there is nothing to break.
     pub fn symmetry(&self) -> RowSymmetry {
-        let points = self.site.points();
+        let (points, k) = (self.site.points(), self.scene.diffusion_term());
         let volumes = self.site.particles().volumes().ok();
         let volume = |p: usize| volumes.and_then(|volumes| volumes.get(p).ok()).unwrap_or(1.0);
-        let mut random = Random::new(1);
-        let mut field = || {
-            points
-                .iter()
-                .map(|_| {
-                    let mut u = S::Value::ZERO;
-                    u.set(0, random.uniform() - 0.5);
-                    u
-                })
-                .collect::<Vec<_>>()
-        };
-        let (a, b) = (field(), field());
-        let k = self.scene.diffusion_term();
-        let (mut defect, mut size) = (0.0, 0.0);
-        for (p, x) in points.iter().enumerate() {
-            let rate = |u: &[S::Value]| k.rate(&self.diffusion, p, x, 0.0, u, S::Value::ZERO).get(0);
-            let (ab, ba) = (volume(p) * a[p].get(0) * rate(&b), volume(p) * b[p].get(0) * rate(&a));
-            defect += ab - ba;
-            size += ab.abs() + ba.abs();
-        }
-        let tolerance = ROUNDING * S::Value::EPSILON * size;
-        if defect.abs() <= tolerance { RowSymmetry::Symmetric } else { RowSymmetry::General }
+        let fields = probes::<S::Value>(points.len());
+        let images = fields.each_ref().map(|u| {
+            let rate = |(p, x)| k.rate(&self.diffusion, p, x, 0.0, u, S::Value::ZERO);
+            points.iter().enumerate().map(rate).collect()
+        });
+        symmetry(&fields, &images, volume)
     }
 
     /// The largest numerical viscosity of order 1 at time t, in the units of a diffusivity; 0 for schemes of higher order.

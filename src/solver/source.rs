@@ -32,12 +32,16 @@ impl<F: Fn(&[f64; D], f64, E) -> E + Sync, const D: usize, E: Fields> SceneTerm<
     }
 
     fn limit(&self, (): &mut (), site: &Site<D>, t: f64, u: &[E], limits: &mut Limits) -> Result<()> {
-        let (mut fastest, scale) = (0.0_f64, difference(u));
+        let (mut fastest, scale) = ((0.0, None), difference(u));
         for (p, x) in site.free() {
             let Some(&u) = u.get(p) else { break };
-            fastest = fastest.max(decay(&self.0, x, t, u, scale).map_err(|error| error.at(p))?);
+            let decay = decay(&self.0, x, t, u, scale).map_err(|error| error.at(p))?;
+            if decay > fastest.0 {
+                fastest = (decay, Some(p));
+            }
         }
-        limits.add(Limit::Source, Rate::decay(fastest));
+        let rate = if E::FIELDS == 1 { Rate::decay(fastest.0) } else { Rate::modulus(fastest.0) };
+        limits.add_of(Limit::Source, rate, fastest.1);
         Ok(())
     }
 
@@ -56,7 +60,7 @@ fn decay<const D: usize, E: Fields>(
     x: &[f64; D],
     t: f64,
     u: E,
-    scale: f64,
+    scale: E,
 ) -> Result<f64> {
     let base = source(x, t, u);
     if !base.finite() {
@@ -68,7 +72,7 @@ fn decay<const D: usize, E: Fields>(
         let mut sum = 0.0;
         for j in 0..E::FIELDS {
             let mut moved = u;
-            moved.set(j, u.get(j) + scale);
+            moved.set(j, u.get(j) + scale.get(j));
             let slope = (source(x, t, moved).get(i) - base.get(i)) / (moved.get(j) - u.get(j));
             if !slope.is_finite() {
                 return Err(SolverError::Source { field: i, t }.into());
@@ -80,8 +84,13 @@ fn decay<const D: usize, E: Fields>(
     Ok(sums)
 }
 
-/// The change of u that a difference quotient is taken with: sqrt(eps) of the largest value, of 1 where all are zero.
-fn difference<E: Fields>(u: &[E]) -> f64 {
-    let largest = u.iter().fold(0.0_f64, |most, u| (0..E::FIELDS).fold(most, |most, i| most.max(u.get(i).abs())));
-    E::EPSILON.sqrt() * if largest > 0.0 { largest } else { 1.0 }
+/// The changes of u that difference quotients are taken with, field by field: sqrt(eps) of the largest value, of 1 where all
+/// are zero.
+fn difference<E: Fields>(u: &[E]) -> E {
+    let mut scale = E::ZERO;
+    for i in 0..E::FIELDS {
+        let largest = u.iter().fold(0.0_f64, |most, u| most.max(u.get(i).abs()));
+        scale.set(i, E::EPSILON.sqrt() * if largest > 0.0 { largest } else { 1.0 });
+    }
+    scale
 }

@@ -1,8 +1,9 @@
 //! Central DC-PSE advection with hyperviscosity, for scattered particles.
 
+use std::collections::BTreeMap;
+
 use super::central::CentralRows;
 use super::fields::Fields;
-use super::free::Free;
 use super::limits::Rate;
 use super::term::Site;
 use super::transport::{Transport, TransportRows};
@@ -18,8 +19,9 @@ use crate::scale::Spacing;
 /// v . grad u - (-1)^(k+1) gamma |v| h^(2k-1) Lap^k u, k the least with 2 k - 1 >= R.
 ///
 /// Lap^k is a Laplacian of order R applied k times. gamma is found when the rows are made, as the least that leaves no
-/// mode growing faster than 1e-3 |v|_max / h ([`Hyperviscosity::tune`]), unless [`gamma`](Self::gamma) gives it. Implicit
-/// schemes and steady problems take the central rows alone.
+/// mode growing faster than 1e-3 |v|_max / h ([`Hyperviscosity::tune`]), unless [`gamma`](Self::gamma) gives it; where the
+/// flow is at rest then, as the largest gamma that flows along the axes need. Implicit schemes and steady problems take the
+/// k-th power of the Laplacian as a matrix.
 #[derive(Clone, Debug)]
 pub struct Stabilized<const D: usize, const R: u32> {
     gradient: DcPse<Gradient<D>, R>,
@@ -67,6 +69,12 @@ impl<const D: usize, E: Fields> StabilizedRows<D, E> {
     pub fn gamma(&self) -> f64 {
         self.gamma
     }
+
+    /// (-1)^k gamma |v| / h, what (h^2 Lap)^k u adds to v . grad u by.
+    fn factor(&self, v: &[f64; D]) -> f64 {
+        let sign = if self.power.is_multiple_of(2) { 1.0 } else { -1.0 };
+        sign * self.gamma * speed(v) / self.h
+    }
 }
 
 impl<const D: usize, const R: u32> Transport<D> for Stabilized<D, R> {
@@ -77,7 +85,7 @@ impl<const D: usize, const R: u32> Transport<D> for Stabilized<D, R> {
         &self,
         site: &Site<D>,
         flow: impl Fn(usize) -> [f64; D] + Sync,
-        _: bool,
+        steady: bool,
         neighbors: &P,
     ) -> Result<StabilizedRows<D, E>> {
         let Spacing(h) = self.h;
@@ -91,21 +99,30 @@ impl<const D: usize, const R: u32> Transport<D> for Stabilized<D, R> {
             Some(gamma) => gamma,
             None => {
                 // Found in `f64`, whatever the fields.
-                let rows: Rows<[f64; D]> = Rows::assemble(&Free { method: &self.gradient, site }, neighbors)?;
-                let laplacian: Rows = Rows::assemble(&Free { method: &self.laplacian, site }, neighbors)?;
-                let velocities: Vec<_> = (0..site.points().len()).map(&flow).collect();
+                let rows: Rows<[f64; D]> = Rows::assemble(&site.screened(&self.gradient), neighbors)?;
+                let laplacian: Rows = Rows::assemble(&site.screened(&self.laplacian), neighbors)?;
+                let count = site.points().len();
+                let mut flows = vec![(0..count).map(&flow).collect::<Vec<_>>()];
+                if !steady && flows[0].iter().all(|v| *v == [0.0; D]) {
+                    let along = |axis| vec![std::array::from_fn(|i| f64::from(u8::from(i == axis))); count];
+                    flows = (0..D).map(along).collect();
+                }
                 let mut term = Hyperviscosity::new(laplacian, R, self.h, 0.0)?;
-                let bare = |u: &[f64], du: &mut [f64]| {
-                    rows.apply_along(&velocities, u, du)?;
-                    du.iter_mut().for_each(|du| *du = -*du);
-                    Ok(())
-                };
-                term.tune(&SpectrumEstimator::new(), &velocities, bare, GROWTH)?.gamma
+                let mut gamma = 0.0_f64;
+                for velocities in &flows {
+                    let bare = |u: &[f64], du: &mut [f64]| {
+                        rows.apply_along(velocities, u, du)?;
+                        du.iter_mut().for_each(|du| *du = -*du);
+                        Ok(())
+                    };
+                    gamma = gamma.max(term.tune(&SpectrumEstimator::new(), velocities, bare, GROWTH)?.gamma);
+                }
+                gamma
             }
         };
         Ok(StabilizedRows {
             central: CentralRows::build(&self.gradient, site, neighbors)?,
-            laplacian: Rows::assemble(&Free { method: &self.laplacian, site }, neighbors)?,
+            laplacian: Rows::assemble(&site.screened(&self.laplacian), neighbors)?,
             h,
             power: (R + 1).div_ceil(2) as usize,
             gamma,
@@ -138,13 +155,21 @@ impl<const D: usize, E: Fields> TransportRows<D, E> for StabilizedRows<D, E> {
 
     #[inline(always)]
     fn along(&self, p: usize, v: &[f64; D], u: &[E]) -> E {
-        let sign = if self.power.is_multiple_of(2) { 1.0 } else { -1.0 };
-        let factor = E::Scalar::lift(sign * self.gamma * speed(v) / self.h);
-        self.central.along(p, v, u).plus_product(factor, self.powers[0][p])
+        self.central.along(p, v, u).plus_product(E::Scalar::lift(self.factor(v)), self.powers[0][p])
     }
 
     fn entries(&self, p: usize, v: &[f64; D], entry: &mut dyn FnMut(usize, f64)) {
         self.central.entries(p, v, entry);
+        let mut row = BTreeMap::from([(p, self.factor(v))]);
+        for _ in 0..self.power {
+            let mut next = BTreeMap::new();
+            for (q, weight) in row {
+                let square = self.h * self.h * weight;
+                self.laplacian.entries_of(q, |w| square * w[0], &mut |q, w| *next.entry(q).or_insert(0.0) += w);
+            }
+            row = next;
+        }
+        row.into_iter().for_each(|(q, w)| entry(q, w));
     }
 
     fn rate(&self, p: usize, v: &[f64; D]) -> Result<Rate> {

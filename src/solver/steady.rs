@@ -60,7 +60,7 @@ pub fn steady<const D: usize, S: Scene<D>, P: Neighbors<D>>(
     let count = particles.len();
     let zero = vec![S::Value::ZERO; count];
     let slopes = slopes(&discrete, &zero)?;
-    let matrix = discrete.matrix_with(0.0, |p| slopes.get(p).copied().unwrap_or(0.0))?;
+    let matrix = discrete.matrix_with(0.0, 0.0, |p| slopes.get(p).copied().unwrap_or(0.0))?;
     if count > 0 && annihilates_constants(&matrix) {
         return Err(SolverError::OpenLevel { particles: count }.into());
     }

@@ -5,6 +5,7 @@ use super::limits::Limits;
 use crate::apply::Report;
 use crate::error::{Result, SolverError};
 use crate::neighbors::Neighbors;
+use crate::operator::{Screen, Screened};
 use crate::particles::Particles;
 
 /// Where the terms of a scene act: the particles, and which of them have a prescribed value.
@@ -13,7 +14,7 @@ pub struct Site<const D: usize> {
     particles: Particles<D>,
     /// Empty where no value is prescribed.
     prescribed: Vec<bool>,
-    /// Particles with outward normals where the flow may come in.
+    /// Particles with outward normals where the flow may come in, in ascending order.
     inflow: Vec<(usize, [f64; D])>,
 }
 
@@ -61,6 +62,12 @@ impl<const D: usize> Site<D> {
         self.prescribed.get(p).copied().unwrap_or(false)
     }
 
+    /// The rows of a method where no value is prescribed, zeros elsewhere: there a row may not even exist, as at a corner or
+    /// where the flow comes in.
+    pub(super) fn screened<'a, M>(&'a self, method: &'a M) -> Screened<'a, M, &'a Self> {
+        Screened { method, screen: self }
+    }
+
     /// Prescribes the values of these particles.
     pub(super) fn prescribe(&mut self, particles: impl IntoIterator<Item = usize>) {
         for p in particles {
@@ -76,17 +83,24 @@ impl<const D: usize> Site<D> {
     /// Says where the flow may come in.
     pub(super) fn open(&mut self, inflow: &[(usize, [f64; D])]) {
         self.inflow.extend_from_slice(inflow);
+        self.inflow.sort_by_key(|&(p, _)| p);
     }
 
     /// Whether a velocity v comes in at particle p, where an inflow condition stands.
     pub(super) fn comes_in(&self, p: usize, v: &[f64; D]) -> bool {
         let inward = |normal: &[f64; D]| v.iter().zip(normal).fold(0.0, |sum, (v, n)| sum + v * n) < 0.0;
-        self.inflow.iter().any(|(q, normal)| *q == p && inward(normal))
+        self.inflow.binary_search_by_key(&p, |&(q, _)| q).is_ok_and(|i| inward(&self.inflow[i].1))
     }
 
     /// Every particle with its point, the prescribed ones left out.
     pub(super) fn free(&self) -> impl Iterator<Item = (usize, &[f64; D])> {
         self.points().iter().enumerate().filter(|&(p, _)| !self.prescribed(p))
+    }
+}
+
+impl<const D: usize> Screen<D> for &Site<D> {
+    fn leaves_out(&self, p: usize) -> bool {
+        self.prescribed(p)
     }
 }
 
@@ -136,7 +150,7 @@ pub trait SceneTerm<const D: usize, E: Fields>: Sync {
     /// What the build of the rows found.
     fn report<'a>(&self, rows: &'a Self::Rows) -> Option<&'a Report>;
 
-    /// Whether no weight on a neighbor is negative in the matrix of this term, so that none of its modes grows.
+    /// Whether the row sums of the matrix of this term leave none of its modes growing, as where no weight is negative.
     fn monotone(&self, rows: &Self::Rows) -> bool {
         let _ = rows;
         true

@@ -3,7 +3,6 @@
 use num_traits::AsPrimitive;
 
 use super::fields::Fields;
-use super::free::Free;
 use super::limits::Rate;
 use super::term::Site;
 use super::transport::{Transport, TransportRows};
@@ -53,7 +52,7 @@ impl<const D: usize> Transport<D> for UpwindGradient<D> {
         steady: bool,
         neighbors: &P,
     ) -> Result<OneSidedRows<D, E>> {
-        let rows: Rows<[f64; D], E::Scalar> = Rows::assemble(&Free { method: self, site }, neighbors)?;
+        let rows: Rows<[f64; D], E::Scalar> = Rows::assemble(&site.screened(self), neighbors)?;
         let (mut sums, mut sides) = ([0.0_f64; D], vec![0; rows.targets()]);
         for (p, sides) in sides.iter_mut().enumerate() {
             let mut own = [[0.0_f64; 2]; D];

@@ -107,7 +107,9 @@ fn tuned_hyperviscosity_bounds_what_grows_without_it() {
             rows.apply(u, du)?;
             damping.add(&velocities, u, du)
         });
-        assert!(without > 5.0 && with < 1.2, "{order} {without} {with}");
+        // A wave of 1 and noise of 0.1, each mode of which may grow by exp(1e-3 t/h).
+        let most = 1.1 * (1e-3 * 2.0 / h.0).exp();
+        assert!(without > 5.0 && with <= most, "{order} {without} {with} {most}");
     }
 }
 

@@ -199,6 +199,8 @@ fn spectra_lie_left_of_the_axis_up_to_jitter_of_three_tenths() {
             [vec![[1.0, 0.0]; set.len()], vec![[0.8, -0.6]; set.len()], set.points().iter().map(turning).collect()];
         for method in both(&set) {
             let rows = assemble(method, &set, &periodic());
+            let along = |v: [f64; 2]| dense::matrix(set.len(), |u, du| rows.apply(&vec![v; set.len()], u, du));
+            let sides = [[along([1.0, 0.0]), along([-1.0, 0.0])], [along([0.0, 1.0]), along([0.0, -1.0])]];
             for velocities in &fields {
                 let a = dense::matrix(set.len(), |u, du| rows.apply(velocities, u, du)).scale(-1.0);
                 let values = dense::eigenvalues(&a);
@@ -207,7 +209,18 @@ fn spectra_lie_left_of_the_axis_up_to_jitter_of_three_tenths() {
                 let bound = rows.rate_bound(velocities).unwrap();
                 // Rounding of the dense eigenvalues, 196 of a matrix that is not normal.
                 assert!(right <= 1e-11 * outer, "{jitter} {} {right} {outer}", method.order());
-                assert!((outer..=5.0 * outer).contains(&bound), "{bound} {outer}");
+                let row = |(p, v): (usize, &[f64; 2])| -> f64 {
+                    let part = |axis: usize| {
+                        let side = &sides[axis][usize::from(v[axis] < 0.0)];
+                        v[axis].abs() * side.row(p).iter().map(|a| a.abs()).sum::<f64>()
+                    };
+                    part(0) + part(1)
+                };
+                let expected = velocities.iter().enumerate().map(row).fold(0.0, f64::max);
+                // The row sums to their rounding; Gershgorin's discs hold the spectrum.
+                assert!((bound / expected - 1.0).abs() < 1e-12 && outer <= bound, "{bound} {expected} {outer}");
+                // The figure the documentation gives.
+                assert!(bound <= 4.0 * outer, "{bound} {outer}");
                 // RK4 bears |lambda| dt <= 2.6 in the left half of its region.
                 assert!(dense::amplification(&values, 2.6 / outer, 4) <= 1.0 + 1e-10, "{jitter} {}", method.order());
             }

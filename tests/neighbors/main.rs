@@ -9,4 +9,5 @@ mod half_list;
 mod nearest;
 mod particles;
 mod providers_agree;
+mod quality;
 mod verlet;

@@ -1,13 +1,21 @@
 //! Scenes, and Eulerian and Lagrangian runs.
 
+#[path = "../linear/dense/mod.rs"]
+mod dense;
 mod eulerian;
 mod eulerian_faults;
 mod eulerian_ledger;
+mod eulerian_limits;
 mod eulerian_order;
 mod eulerian_schemes;
 mod eulerian_stiff;
+mod hyperviscosity;
+mod jump;
 mod lagrangian;
+mod lagrangian_growth;
 mod remeshed;
 mod resume;
 mod scene;
+mod sharp_limits;
 mod steady;
+mod watch;

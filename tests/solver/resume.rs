@@ -1,8 +1,8 @@
 //! Runs put aside and taken up again go on with the same bits.
 
 use parops::{
-    AdvectionDiffusion, DcPse, Domain, Eulerian, Gradient, ImplicitScheme, Laplacian, Leapfrog, Nearest, Particles,
-    Result, Rk4, SavedRun, Scene, SspRk3, StepPolicy, TimeScheme,
+    AdvectionDiffusion, DcPse, Domain, Eulerian, Gradient, GrowthPolicy, ImplicitScheme, Laplacian, Leapfrog, Nearest,
+    Particles, Result, Rk4, SavedRun, Scene, SspRk3, StepPolicy, TimeScheme,
 };
 
 const STEPS: usize = 100;
@@ -46,7 +46,8 @@ where
 {
     let (particles, neighbors) = set()?;
     let start = || -> Result<Eulerian<2, S, St>> {
-        Ok(Eulerian::new(scene(), &particles, &neighbors, stepper())?.step_policy(StepPolicy::Allow))
+        let (steps, growth) = (StepPolicy::Allow, GrowthPolicy::Allow);
+        Eulerian::with_policy(scene(), &particles, &neighbors, stepper(), steps, growth)
     };
     let mut whole = wave(&particles);
     let mut run = start()?;
@@ -105,7 +106,8 @@ fn implicit_runs_resume_with_equal_bits() -> Result<()> {
 #[test]
 fn a_run_of_another_size_is_refused() -> Result<()> {
     let (particles, neighbors) = set()?;
-    let mut run = Eulerian::new(flowing(), &particles, &neighbors, Rk4::new())?;
+    let (steps, growth) = (StepPolicy::Allow, GrowthPolicy::Unknown);
+    let mut run = Eulerian::with_policy(flowing(), &particles, &neighbors, Rk4::new(), steps, growth)?;
     let mut u = wave(&particles);
     run.step(&mut u, DT)?;
     let mut saved = run.save(&u);

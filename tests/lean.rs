@@ -1,0 +1,301 @@
+//! What six scenes take: bytes a particle against what the arithmetic says, allocations, sweeps over rows a step.
+//!
+//! Their packages and the size of their programs are checked by `.ci/lean`, their results by the examples `lean_*`.
+//! Several threads have pools that allocate: nothing is measured with the feature `rayon`.
+#![cfg(not(feature = "rayon"))]
+#![allow(unsafe_code)]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+use parops::{
+    AdvectionDiffusion, Apply, Boundary, BoundaryCondition, Carried, CellList, DcPse, Domain, Euler, Eulerian,
+    Gradient, ImplicitScheme, Lagrangian, Lambda, Laplacian, Mesh, Nearest, Neighbors, Particles, Plan, Pse, Remeshing,
+    Result, Rk4, Scene, Spacing, Stages, Trigger, UpwindGradient, integrate, steady,
+};
+
+struct Measuring;
+
+thread_local! {
+    static COUNT: Cell<usize> = const { Cell::new(0) };
+    /// Below zero where a thread gives back what another one took.
+    static USED: Cell<isize> = const { Cell::new(0) };
+    static PEAK: Cell<isize> = const { Cell::new(0) };
+}
+
+/// While a thread ends its counters may be gone; nothing is measured then.
+fn taken(bytes: usize) {
+    let _ = COUNT.try_with(|count| count.set(count.get() + 1));
+    let used = USED.try_with(|used| {
+        used.set(used.get() + bytes as isize);
+        used.get()
+    });
+    let _ = used.and_then(|used| PEAK.try_with(|peak| peak.set(peak.get().max(used))));
+}
+
+fn given_back(bytes: usize) {
+    let _ = USED.try_with(|used| used.set(used.get() - bytes as isize));
+}
+
+// SAFETY: every call is handed to the system allocator unchanged.
+unsafe impl GlobalAlloc for Measuring {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        taken(layout.size());
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        given_back(layout.size());
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Measuring = Measuring;
+
+/// What `f` took, in bytes a particle: held by what it returns, and at the worst moment; and how often it allocated.
+#[derive(Debug)]
+struct Cost {
+    held: f64,
+    peak: f64,
+    allocations: usize,
+}
+
+fn cost<R>(f: impl FnOnce() -> R) -> (R, Cost) {
+    let (used, count) = (USED.get(), COUNT.get());
+    PEAK.set(used);
+    let result = f();
+    let each = |bytes: isize| (bytes - used) as f64 / N as f64;
+    let (held, peak) = (each(USED.get()), each(PEAK.get()));
+    (result, Cost { held, peak, allocations: COUNT.get() - count })
+}
+
+/// Particles along an axis, and all.
+const SIDE: usize = 64;
+const N: usize = SIDE * SIDE;
+
+/// A point and a number, in bytes.
+const POINT: f64 = 16.0;
+const NUMBER: f64 = 8.0;
+
+/// What does not grow with the particles, such as the masses of a ledger: 2 kB.
+const CONSTANT: f64 = 0.5;
+
+/// Working memory of an assembly: 512 rows of 4096 wait in it at a time.
+const BLOCK: f64 = 1.0 / 8.0;
+
+/// Bytes of stored rows: an offset, and a column and K weights a pair.
+fn rows(pairs: f64, outputs: f64) -> f64 {
+    NUMBER + pairs * (4.0 + outputs * NUMBER)
+}
+
+fn within(found: f64, bytes: f64) -> bool {
+    (bytes - CONSTANT..=bytes + CONSTANT).contains(&found)
+}
+
+fn torus() -> Result<Domain<2>> {
+    Domain::periodic([0.0; 2], [1.0; 2])
+}
+
+fn scattered() -> Result<Particles<2>> {
+    Particles::jittered([0.0; 2], [1.0; 2], [SIDE; 2], 0.2, 1)?.with_equal_volumes(1.0)
+}
+
+/// Mean number of neighbors within the cutoff of each.
+fn pairs(neighbors: &impl Neighbors<2>, cutoff: impl Fn(usize) -> f64) -> f64 {
+    (0..N).map(|p| neighbors.count(p, cutoff(p))).sum::<usize>() as f64 / N as f64
+}
+
+fn applies<S: Scene<2>>(_: &S) -> usize {
+    S::APPLIES
+}
+
+#[test]
+fn counters_count() {
+    let (kept, cost) = cost(|| {
+        drop(std::hint::black_box(vec![0_u8; 3 * N]));
+        vec![0_u8; 2 * N]
+    });
+    assert_eq!((cost.held, cost.peak, cost.allocations, kept.len()), (2.0, 3.0, 2, 2 * N));
+}
+
+#[test]
+fn derivative_takes_its_rows() -> Result<()> {
+    let set = scattered()?;
+    let gradient = DcPse::<Gradient<2>, 2>::new();
+    let (neighbors, provider) = cost(|| Nearest::build(&set, &Domain::open(), gradient.fewest_neighbors::<2>()?));
+    let neighbors = neighbors?;
+    // A cutoff, and four cell lists of even spacing: each holds the points twice, a source, an image, a slot and cells.
+    assert!(provider.held <= NUMBER + 4.0 * (2.0 * POINT + 16.0), "{provider:?}");
+
+    let (made, assembly) = cost(|| gradient.assemble(&neighbors));
+    let made = made?;
+    // The signs of a first derivative are '+', so that there is a diagonal.
+    let expected = rows(pairs(&neighbors, |p| neighbors.cutoff(p)), 2.0) + 2.0 * NUMBER;
+    assert!(within(assembly.held, expected), "{assembly:?} {expected}");
+    assert!(assembly.peak <= expected * (1.0 + BLOCK), "{assembly:?}");
+    // None of them a particle: scratch grows to the longest row, and then stays.
+    assert!(assembly.allocations <= 128, "{assembly:?}");
+
+    let (values, mut slopes) = (vec![1.0; N], vec![[0.0; 2]; N]);
+    let (applied, apply) = cost(|| made.apply_all(&values, &mut slopes));
+    assert_eq!((applied, apply.allocations), (Ok(()), 0));
+    Ok(())
+}
+
+#[test]
+fn lattice_diffusion_takes_rows_and_four_states_and_applies_once_a_stage() -> Result<()> {
+    let lattice = Particles::lattice([0.0; 2], [1.0; 2], [SIDE; 2])?;
+    let pse = Pse::new(Laplacian::<2>, 4, lattice.spacing()?.epsilon(2.0)?, lattice.volumes()?)?;
+    let neighbors = CellList::build(&lattice, &torus()?, pse.cutoff())?;
+    let (laplacian, assembly) = cost(|| pse.assemble(&neighbors));
+    let laplacian = laplacian?;
+    // Volumes and epsilon are one number each.
+    let expected = rows(pairs(&neighbors, |_| pse.cutoff().0), 1.0);
+    assert!(within(assembly.held, expected), "{assembly:?} {expected}");
+    assert!(assembly.peak <= expected * (1.0 + BLOCK) && assembly.allocations <= 256, "{assembly:?}");
+
+    for steps in [2_u32, 20] {
+        let plan = Plan::new(0.0, 1e-6 * f64::from(steps), 1e-6)?;
+        let (mut u, mut applied) = (vec![1.0; N], 0);
+        let heat = |_, u: &Vec<f64>, du: &mut Vec<f64>| {
+            applied += 1;
+            laplacian.apply(u, du)
+        };
+        let (done, run) = cost(|| integrate(&mut Rk4::new(), &mut u, &plan, heat, |_, _, _| {}));
+        done?;
+        // The copy that is stepped and three stages, however many steps there are.
+        assert_eq!((run.peak, run.allocations, applied), (4.0 * NUMBER, 4, 4 * steps));
+    }
+    Ok(())
+}
+
+/// Bytes of a sparse matrix: an offset, and a column and a value an entry.
+fn matrix(entries: f64) -> f64 {
+    NUMBER + entries * 12.0
+}
+
+#[test]
+fn poisson_takes_rows_three_matrices_and_two_bases() -> Result<()> {
+    /// Krylov vectors of GMRES at its defaults, once for the solution and once for the condition.
+    const BASES: f64 = 2.0 * 61.0;
+    /// Points and terms of the scene, right sides, scales, residuals.
+    const VECTORS: f64 = 20.0;
+    let set = scattered()?;
+    let edge = |i: usize| i == 0 || i == SIDE - 1;
+    let walls: Vec<_> = (0..N).filter(|p| edge(p % SIDE) || edge(p / SIDE)).map(BoundaryCondition::dirichlet).collect();
+    let laplacian = DcPse::<Laplacian<2>, 2>::new();
+    let neighbors = Nearest::build(&set, &Domain::open(), laplacian.fewest_neighbors::<2>()?)?;
+    let pairs = pairs(&neighbors, |p| neighbors.cutoff(p));
+    let boundary = Boundary::new(2).conditions(walls);
+    let scene = AdvectionDiffusion::<2>::new().diffusion(1.0, laplacian).source(|_, _, _| 1.0);
+    let scene = scene.boundary(boundary, |_, _, _| 0.0);
+    assert_eq!(applies(&scene), 1);
+    let (state, solve) = cost(|| steady(scene, &set, &neighbors));
+    assert!(state?.u.len() == N);
+    // The matrix, its factors, its transpose.
+    let expected = rows(pairs, 1.0) + 3.0 * matrix(pairs + 1.0) + (BASES + VECTORS) * NUMBER;
+    assert!(solve.peak <= expected && solve.allocations <= 400, "{solve:?} {expected}");
+    Ok(())
+}
+
+#[test]
+fn upwind_takes_rows_and_places_and_sweeps_once_a_step() -> Result<()> {
+    let set = scattered()?;
+    let upwind = UpwindGradient::new(Spacing(1.0 / SIDE as f64).epsilon(1.0)?, set.volumes()?).support(3.0)?;
+    let cutoff = upwind.cutoff();
+    let neighbors = CellList::build(&set, &torus()?, cutoff)?;
+    let calls = AtomicUsize::new(0);
+    let wind = |_: &[f64; 2], _: f64| {
+        calls.fetch_add(1, Relaxed);
+        [1.0, 0.5]
+    };
+    let scene = AdvectionDiffusion::<2>::new().advection(wind, upwind);
+    assert_eq!(applies(&scene) * Euler::<Vec<f64>>::STAGES, 1);
+    let (run, build) = cost(|| Eulerian::new(scene, &set, &neighbors, Euler::new()));
+    let mut run = run?;
+    // Two weights a pair serve any velocity; four bytes say which sides a particle has.
+    let expected = rows(pairs(&neighbors, |_| cutoff.0), 2.0) + POINT + 4.0;
+    assert!(within(build.held, expected), "{build:?} {expected}");
+    assert!(build.peak <= expected * (1.0 + BLOCK) && build.allocations <= 160, "{build:?}");
+
+    let mut u = vec![1.0; N];
+    // Euler has a rate and the next state.
+    let (stepped, first) = cost(|| run.step(&mut u, 1e-4).map(drop));
+    assert!(stepped.is_ok() && within(first.held, 2.0 * NUMBER), "{first:?}");
+    calls.store(0, Relaxed);
+    let (stepped, later) = cost(|| (0..5).try_for_each(|_| run.step(&mut u, 1e-4).map(drop)));
+    // One velocity a particle for its row, one for the limit of the step.
+    assert_eq!((stepped, later.peak, later.allocations, calls.load(Relaxed)), (Ok(()), 0.0, 0, 5 * 2 * N));
+    Ok(())
+}
+
+#[test]
+fn remeshed_particles_take_places_and_strengths_and_no_rows() -> Result<()> {
+    /// Steps between two remeshings.
+    const PERIOD: u64 = 4;
+    let torus = torus()?;
+    let mesh = Mesh::nodes(&torus, [SIDE; 2])?;
+    let nodes = Particles::new(mesh.points().collect())?.with_equal_volumes(1.0)?;
+    let (calls, u) = (AtomicUsize::new(0), vec![1.0; N]);
+    let wind = |x: &[f64; 2], _: f64| {
+        calls.fetch_add(1, Relaxed);
+        [x[1], 0.5]
+    };
+    let scene = AdvectionDiffusion::<2>::new().advection(wind, Carried);
+    assert_eq!(applies(&scene), 0);
+    let remeshing = Remeshing { kernel: Lambda::<4, 2>::new()?, mesh, trigger: Trigger::Steps(PERIOD), threshold: 0.0 };
+    let (run, build) =
+        cost(|| Lagrangian::new(scene, &nodes, &u, &torus, Rk4::new()).and_then(|run| run.remeshing(remeshing)));
+    let mut run = run?;
+    // Places of the state, of a step that may fail, of the stage, and of the stage inside the domain; strengths and
+    // volumes do not change, and stand once.
+    assert!(within(build.held, 4.0 * POINT + 2.0 * NUMBER) && build.allocations <= 64, "{build:?}");
+
+    // Three stages of places.
+    let (stepped, first) = cost(|| run.step(1e-4).map(drop));
+    assert_eq!((stepped, first.held), (Ok(()), 3.0 * POINT));
+    for remeshed in [false, false, true, false, false, false, true] {
+        calls.store(0, Relaxed);
+        let (stepped, step) = cost(|| run.step(1e-4).map(drop));
+        // The four stages, and four differences and the velocity itself for |grad v|.
+        assert_eq!((stepped, calls.load(Relaxed)), (Ok(()), (4 + 5) * N));
+        if remeshed {
+            // Values on the mesh, new particles with strengths and volumes, and lists of the nodes in use.
+            assert!(step.peak <= 2.0 * POINT + 4.0 * NUMBER && step.allocations <= 32, "{step:?}");
+        } else {
+            assert_eq!((step.peak, step.allocations), (0.0, 0));
+        }
+    }
+    assert_eq!(run.ledger().remeshings, 2);
+    Ok(())
+}
+
+#[test]
+fn implicit_steps_take_rows_and_three_matrices() -> Result<()> {
+    /// Of BiCGSTAB 8, of the scheme 7, of the solver 4, of the factors 1.
+    const VECTORS: f64 = 20.0;
+    /// Of the estimate of growth: 33 of its space, and those that go through the scene.
+    const SPACE: f64 = 40.0;
+    let set = scattered()?;
+    let laplacian = DcPse::<Laplacian<2>, 2>::new();
+    let neighbors = Nearest::build(&set, &torus()?, laplacian.fewest_neighbors::<2>()?)?;
+    let pairs = pairs(&neighbors, |p| neighbors.cutoff(p));
+    let scene = AdvectionDiffusion::<2>::new().diffusion(1.0, laplacian).source(|_, _, _| 1.0);
+    assert_eq!(applies(&scene), 1);
+    let (run, build) = cost(|| Eulerian::new(scene, &set, &neighbors, ImplicitScheme::euler()));
+    let mut run = run?;
+    let expected = rows(pairs, 1.0) + POINT;
+    assert!(within(build.held, expected), "{build:?} {expected}");
+    assert!(build.peak <= expected + SPACE * NUMBER && build.allocations <= 640, "{build:?}");
+
+    let mut u: Vec<f64> = set.points().iter().map(|x| (6.0 * x[0]).sin()).collect();
+    let (stepped, first) = cost(|| run.step(&mut u, 0.1).map(drop));
+    // The matrix of the scene, that of the step with room for a diagonal it may lack, its factors; which rows are algebraic.
+    let expected = 3.0 * matrix(pairs + 1.0) + 12.0 + VECTORS * NUMBER + 1.0;
+    assert!(stepped.is_ok() && within(first.held, expected) && within(first.peak, expected), "{first:?} {expected}");
+    let (stepped, later) = cost(|| (0..5).try_for_each(|_| run.step(&mut u, 0.1).map(drop)));
+    assert_eq!((stepped, later.peak, later.allocations), (Ok(()), 0.0, 0));
+    Ok(())
+}

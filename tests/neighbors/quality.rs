@@ -1,0 +1,106 @@
+//! Gaps, holes, counts, disorder and volumes of a set.
+
+use parops::{
+    BruteForce, Cutoff, Domain, DomainError, ErrorKind, Face, Neighbors, Particles, SetQuality, Volumes, least_gap,
+};
+
+const EPS: f64 = f64::EPSILON;
+
+fn torus() -> Domain<2> {
+    Domain::periodic([0.0; 2], [1.0; 2]).unwrap()
+}
+
+#[test]
+fn set_quality_agrees_with_what_brute_force_counts() {
+    for seed in 1..=4 {
+        let set = Particles::jittered([0.0; 2], [1.0; 2], [12; 2], 0.4, seed).unwrap();
+        let cutoff = Cutoff(0.2);
+        let quality = SetQuality::measure(&set, &torus(), cutoff).unwrap();
+        let all = BruteForce::build(&set, &torus(), cutoff).unwrap();
+        let mut counts: Vec<usize> = (0..set.len()).map(|p| all.count(p, 0.2)).collect();
+        let loneliest = quality.loneliest.unwrap();
+        assert_eq!(counts[loneliest], quality.fewest);
+        counts.sort_unstable();
+        assert_eq!((quality.fewest, quality.median, quality.most), (counts[0], counts[72], counts[143]));
+        assert_eq!(quality.separation, least_gap(&all));
+        let mut least = f64::INFINITY;
+        all.for_each(quality.closest.unwrap(), 0.2, |q| least = least.min(q.separation[0].hypot(q.separation[1])));
+        // A root of the sum of squares, and hypot: two roundings apart.
+        assert!((least / quality.separation - 1.0).abs() <= 4.0 * EPS);
+    }
+}
+
+#[test]
+fn disorder_is_proportional_to_small_displacements_and_zero_on_lattices() {
+    let of = |amount: f64| {
+        let set = Particles::jittered([0.0; 2], [1.0; 2], [16; 2], amount, 3).unwrap();
+        SetQuality::measure(&set, &torus(), Cutoff(2.5 / 16.0)).unwrap()
+    };
+    assert!(of(0.0).disorder <= 64.0 * EPS);
+    let (small, twice) = (of(1e-4), of(2e-4));
+    assert!((twice.disorder / small.disorder - 2.0).abs() < 1e-3, "{} {}", small.disorder, twice.disorder);
+    // The figures of the documentation.
+    assert!((0.02..0.035).contains(&of(0.1).disorder) && (0.06..0.1).contains(&of(0.3).disorder));
+    let most = of(0.3);
+    assert!(most.largest_disorder > most.disorder && most.most_disordered.is_some());
+}
+
+#[test]
+fn disorder_names_the_particle_that_was_moved() {
+    let mut points = Particles::lattice([0.0; 2], [1.0; 2], [10; 2]).unwrap().points().to_vec();
+    points[55] = [points[55][0] + 0.03, points[55][1]];
+    let quality = SetQuality::measure(&Particles::new(points).unwrap(), &torus(), Cutoff(0.25)).unwrap();
+    assert_eq!(quality.most_disordered, Some(55));
+    assert!((quality.separation - 0.07).abs() < 1e-12 && [Some(55), Some(65)].contains(&quality.closest));
+}
+
+#[test]
+fn fill_sees_a_hole_that_counts_do_not() {
+    let mut points = Particles::lattice([0.0; 2], [1.0; 2], [20; 2]).unwrap().points().to_vec();
+    // A hole of radius 2.5 h around a corner of four cells.
+    points.retain(|x| (x[0] - 0.5).hypot(x[1] - 0.5) >= 2.5 / 20.0);
+    for faces in [[Face::Periodic; 2], [Face::Open; 2]] {
+        let domain = Domain::new([0.0; 2], [1.0; 2], [faces; 2]).unwrap();
+        let set = Particles::new(points.clone()).unwrap();
+        let quality = SetQuality::measure(&set, &domain, Cutoff(0.3)).unwrap();
+        // The nearest of those left around (0.5, 0.5) is at (0.5, 2.5) h; probes are 0.7 h apart at most.
+        let hole = 0.5_f64.hypot(2.5) / 20.0;
+        assert!(quality.fill <= hole + EPS && quality.fill >= hole - 0.7 / 20.0, "{}", quality.fill * 20.0);
+    }
+    let sparse = Particles::new(vec![[0.1, 0.1]]).unwrap();
+    assert_eq!(SetQuality::measure(&sparse, &torus(), Cutoff(0.1)).unwrap().fill, f64::INFINITY);
+}
+
+#[test]
+fn volume_defect_is_that_of_the_box_and_absent_without_one() {
+    let set = Particles::jittered([0.0; 2], [1.0; 2], [10; 2], 0.3, 1).unwrap();
+    let defect =
+        |set: &Particles<2>, domain: &Domain<2>| SetQuality::measure(set, domain, Cutoff(0.2)).unwrap().volume_defect;
+    assert!(defect(&set, &torus()).unwrap().abs() <= 64.0 * EPS);
+    assert_eq!(defect(&set, &Domain::open()), None);
+    assert_eq!(defect(&Particles::new(set.points().to_vec()).unwrap(), &torus()), None);
+    let wrong =
+        set.with_volumes(Volumes::each((0..100).map(|p| 0.0089 + 0.0004 * f64::from(p % 2)).collect()).unwrap());
+    assert!((defect(&wrong.unwrap(), &torus()).unwrap() + 0.09).abs() <= 1e-12);
+}
+
+#[test]
+fn set_quality_answers_on_poor_sets_and_refuses_what_cells_refuse() {
+    let measure = |points: Vec<[f64; 3]>| {
+        SetQuality::measure(&Particles::new(points).unwrap(), &Domain::open(), Cutoff(0.5)).unwrap()
+    };
+    let none = measure(Vec::new());
+    assert_eq!((none.fewest, none.median, none.most, none.fill, none.disorder), (0, 0, 0, 0.0, 0.0));
+    assert_eq!((none.separation, none.loneliest), (f64::INFINITY, None));
+    let one = measure(vec![[1.0; 3]]);
+    assert_eq!((one.most, one.separation, one.closest), (0, f64::INFINITY, None));
+    let heap = measure(vec![[1.0; 3]; 5]);
+    assert_eq!((heap.fewest, heap.most, heap.separation, heap.disorder), (4, 4, 0.0, 0.0));
+    // A plane in space, and an outlier far away.
+    let mut plane: Vec<[f64; 3]> = (0..100).map(|i| [0.1 * f64::from(i % 10), 0.1 * f64::from(i / 10), 0.0]).collect();
+    plane.push([1e9, 0.0, 0.0]);
+    let far = measure(plane);
+    assert_eq!((far.fewest, far.loneliest), (0, Some(100)));
+    let narrow = SetQuality::measure(&Particles::new(vec![[0.5; 2]]).unwrap(), &torus(), Cutoff(0.6)).unwrap_err();
+    assert!(matches!(narrow.kind(), ErrorKind::Domain(DomainError::Narrow { .. })));
+}

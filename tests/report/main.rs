@@ -1,0 +1,6 @@
+//! Samples, their table and their page.
+
+mod page;
+mod table;
+mod task;
+mod watch;

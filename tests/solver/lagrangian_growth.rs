@@ -1,0 +1,107 @@
+//! Modes of the diffusion term that come to grow while particles move.
+
+use std::f64::consts::TAU;
+
+use parops::{
+    AdvectionDiffusion, Carried, CellList, Cutoff, DcPse, Domain, ErrorKind, GrowthPolicy, Lagrangian, Laplacian,
+    MovingDiffusion, MovingScene, MovingSettings, MovingState, Particles, Result, Rk4, Scene, Site, SolverError,
+    Steady,
+};
+
+use crate::dense;
+
+const N: usize = 18;
+const DT: f64 = 0.0125;
+
+fn torus() -> Result<Domain<2>> {
+    Domain::periodic([0.0; 2], [1.0; 2])
+}
+
+fn lattice() -> Result<Particles<2>> {
+    Particles::lattice([0.0; 2], [1.0; 2], [N; 2])
+}
+
+/// Vortices side by side, which tear any set.
+fn cells(x: &[f64; 2]) -> [f64; 2] {
+    let [a, b] = x.map(|x| TAU * x);
+    [a.sin() * b.cos(), -a.cos() * b.sin()]
+}
+
+/// Diffusion with so many neighbors a condition, in vortices.
+fn scene(ratio: f64) -> Result<impl MovingScene<2, Value = f64>> {
+    let laplacian = DcPse::<Laplacian<2>, 2>::new().neighbors_per_condition(ratio)?;
+    Ok(AdvectionDiffusion::<2>::new().diffusion(2e-3, laplacian).advection(Steady(cells), Carried))
+}
+
+type Run<S> = Lagrangian<2, S, Rk4<MovingState<2, f64>>>;
+
+fn start(ratio: f64, growth: GrowthPolicy) -> Result<Run<impl MovingScene<2, Value = f64>>> {
+    let particles = lattice()?;
+    let u: Vec<f64> = particles.points().iter().map(|x| (TAU * x[0]).sin()).collect();
+    let mut settings = MovingSettings::default();
+    settings.growth = growth;
+    Lagrangian::with_settings(scene(ratio)?, &particles, &u, &torus()?, Rk4::new(), settings)
+}
+
+/// max Re(lambda) of the diffusion rows on a set, with the cutoffs of the start, from all eigenvalues.
+fn exact_growth(ratio: f64, set: &Particles<2>) -> Result<f64> {
+    let (scene, torus) = (scene(ratio)?, torus()?);
+    let term = scene.diffusion_term();
+    let kept = term.start(&lattice()?, &torus, MovingSettings::default())?;
+    let kept = MovingDiffusion::<2, f64>::restart(term, &kept, set, 0)?;
+    let site = Site::new(set, &CellList::build(set, &torus, Cutoff(0.1))?)?;
+    let rates = |u: &[f64], du: &mut [f64]| term.rates(&kept, &site, u, du, |_, rate| rate);
+    Ok(dense::extremes(&dense::matrix(set.len(), rates)).0)
+}
+
+#[test]
+fn sets_that_come_to_grow_are_refused_before_the_step_or_recorded() -> Result<()> {
+    // Hardly more neighbors than conditions: legal, and no mode of the lattice grows.
+    const RATIO: f64 = 1.2;
+    let mut allowed = start(RATIO, GrowthPolicy::Allow)?;
+    assert!(allowed.ledger().growth < 1e-9);
+    let (mut first, mut saved) = (0, start(RATIO, GrowthPolicy::Refuse)?.save());
+    for step in 1..=30 {
+        let (set, before) = (allowed.particles()?, allowed.save());
+        let growth = allowed.step(DT)?.growth;
+        if growth > 1e-6 {
+            (first, saved) = (step, before);
+            // Found in 96 products, and in all eigenvalues.
+            let exact = exact_growth(RATIO, &set)?;
+            assert!((growth / exact - 1.0).abs() < 0.01, "{growth} {exact}");
+            break;
+        }
+    }
+    assert!(first > 1);
+
+    let mut refused = start(RATIO, GrowthPolicy::Refuse)?;
+    for _ in 1..first {
+        refused.step(DT)?;
+    }
+    let (before, ledger) = (refused.save(), refused.ledger().clone());
+    let error = refused.step(DT).err().unwrap();
+    let ErrorKind::Solver(SolverError::Growing { rate, .. }) = *error.kind() else { panic!("{error}") };
+    assert_eq!(rate, allowed.ledger().growth);
+    // What was found stays out of a step that was not taken.
+    assert_eq!(
+        (refused.ledger(), refused.save().points, refused.save().strengths),
+        (&ledger, before.points, before.strengths)
+    );
+    // A run taken up again knows what it has to look at.
+    let mut resumed = start(RATIO, GrowthPolicy::Refuse)?;
+    resumed.resume(saved)?;
+    assert_eq!(resumed.step(DT).err().unwrap().kind(), error.kind());
+
+    let mut unknown = start(RATIO, GrowthPolicy::Unknown)?;
+    unknown.advance(first as f64 * DT, DT)?;
+    assert!(unknown.ledger().growth.is_nan());
+    Ok(())
+}
+
+#[test]
+fn sets_with_the_default_neighbors_do_not_come_to_grow_in_the_same_flow() -> Result<()> {
+    let mut run = start(2.0, GrowthPolicy::Refuse)?;
+    run.advance(40.0 * DT, DT)?;
+    assert!(run.ledger().rebuilds > 10 && run.ledger().growth < 1e-9, "{:?}", run.ledger());
+    Ok(())
+}
