@@ -102,7 +102,7 @@ fn carry<const D: usize>(x: &[f64; D], h: f64) -> [f64; D] {
 /// The order in L2 is at least min(P + 1, R + 3/2) for a kernel of exactness P and of class C^R (R = -1 where it jumps).
 ///
 /// The moments leave h^(P+1). A strain of h moves particles across the breaks of the kernel at h of all nodes, each of
-/// which misses h^(R+1): h^(R+3/2) in L2. Where the breaks of neighboring particles cancel it is more.
+/// which misses h^(R+1): h^(R+3/2) in L2. A lower bound only: on grids this coarse wide kernels still gain from resolving the wave.
 fn claims(bench: &mut Bench) {
     let mut found = Vec::new();
     for task in bench.table.tasks().iter().filter(|task| task.samples()[0].scene == SCENE) {
