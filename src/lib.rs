@@ -93,6 +93,7 @@ pub use solver::*;
 pub use stencil::{Neighbor, Side, Stencil};
 pub use time::*;
 
+pub mod guide;
 #[cfg(feature = "testing")]
 pub mod report;
 #[cfg(feature = "testing")]

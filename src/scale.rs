@@ -108,10 +108,23 @@ impl Volumes {
     /// # Errors
     /// [`ParticleError::Volume`] naming the first particle whose volume is not positive and finite.
     pub fn each(volumes: Vec<f64>) -> Result<Self> {
-        for (p, &v) in volumes.iter().enumerate() {
-            legal_volume(v).map_err(|error| error.at(p))?;
+        let mut held = Self(PerParticle::Equal(1.0));
+        held.renew(&volumes)?;
+        Ok(held)
+    }
+
+    /// The same in the place of these, which stay as they are on an error; allocates only where clones share the values.
+    pub(crate) fn renew(&mut self, volumes: &[f64]) -> Result<()> {
+        volumes.iter().enumerate().try_for_each(|(p, &v)| legal_volume(v).map_err(|error| error.at(p)))?;
+        let own = match &mut self.0 {
+            PerParticle::Each(held) => Arc::get_mut(held).filter(|held| held.len() == volumes.len()),
+            PerParticle::Equal(_) => None,
+        };
+        match own {
+            Some(held) => held.copy_from_slice(volumes),
+            None => self.0 = PerParticle::Each(volumes.into()),
         }
-        Ok(Self(PerParticle::Each(volumes.into())))
+        Ok(())
     }
 
     /// Volume of particle p.

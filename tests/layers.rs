@@ -20,6 +20,7 @@ const LAYERS: &[&[&str]] = &[
     &["solver"],
     &["report"],
     &["testing"],
+    &["guide"],
 ];
 
 fn layer(module: &str) -> Option<usize> {

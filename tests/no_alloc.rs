@@ -354,8 +354,8 @@ fn steps_of_every_advection_scheme_after_the_first_allocate_nothing() -> parops:
 
 #[cfg(not(feature = "rayon"))]
 #[test]
-fn lagrangian_steps_of_pure_advection_allocate_nothing() -> parops::Result<()> {
-    use parops::{AdvectionDiffusion, Carried, Lagrangian, MovingScene, MovingSettings, Steady};
+fn lagrangian_steps_that_keep_their_neighbors_allocate_nothing() -> parops::Result<()> {
+    use parops::{AdvectionDiffusion, Carried, DcPse, Lagrangian, MovingScene, MovingSettings, Steady};
     fn count<S: MovingScene<2, Value = f64>>(scene: S, set: &Particles<2>, torus: &Domain<2>) -> parops::Result<usize> {
         let mut settings = MovingSettings::default();
         settings.skin = Some(0.05);
@@ -371,6 +371,18 @@ fn lagrangian_steps_of_pure_advection_allocate_nothing() -> parops::Result<()> {
     let scene = AdvectionDiffusion::<2>::new;
     let shear = Steady(|x: &[f64; 2]| [x[1], 0.0]);
     assert_eq!(count(scene().advection(shear, Carried), &set, &torus)?, 0);
+    let dcpse = DcPse::<Laplacian<2>, 2>::new;
+    assert_eq!(count(scene().advection(shear, Carried).diffusion(1e-3, dcpse()), &set, &torus)?, 0);
+    let pse = Pse::new(Laplacian::<2>, 2, set.spacing()?.epsilon(1.0)?, set.volumes()?)?.support(3.0)?;
+    let pse = pse.allow(Allowance::Everywhere);
+    assert_eq!(count(scene().advection(shear, Carried).diffusion(1e-3, pse), &set, &torus)?, 0);
+    let spring = Steady(|x: &[f64; 2]| [0.1 * (std::f64::consts::TAU * x[0]).sin(), 0.0]);
+    let spread = |x: &[f64; 2], _: f64| 0.1 * std::f64::consts::TAU * (std::f64::consts::TAU * x[0]).cos();
+    let carried = || scene().advection(spring, Carried).divergence(spread).source(|_: &[f64; 2], _: f64, u: f64| -u);
+    assert_eq!(count(carried(), &set, &torus)?, 0);
+    assert_eq!(count(carried().diffusion(1e-3, dcpse()), &set, &torus)?, 0);
+    let rising = |x: &[f64; 2]| 1e-3 * (1.0 + x[0]);
+    assert_eq!(count(scene().advection(shear, Carried).diffusion(rising, dcpse()), &set, &torus)?, 0);
     Ok(())
 }
 

@@ -45,7 +45,7 @@ impl<S: Outputs, T: Field> Rows<S, T> {
             weights: &mut weights,
             diagonal: &mut diagonal,
         };
-        let workers = Workers::new();
+        let workers = Workers::default();
         let made = each_block(blocks, |mut block| {
             workers.with(method, |worker| {
                 let (mut report, mut strays) = (Report::default(), Vec::new());

@@ -24,6 +24,25 @@ pub(super) fn each_block<B: Send, R: Send>(
     blocks.map(work).collect()
 }
 
+/// Does every block and merges what they gave, in order; allocates nothing but what the pool takes.
+///
+/// # Errors
+/// As [`each_block`].
+pub(super) fn each_block_merged<B: Send, R: Send>(
+    blocks: impl Iterator<Item = B>,
+    work: impl Fn(B) -> Result<R> + Sync + Send,
+    #[cfg_attr(feature = "rayon", expect(unused_mut, reason = "called in a loop only without a pool"))]
+    mut merge: impl FnMut(R),
+) -> Result<()> {
+    #[cfg(feature = "rayon")]
+    each_block(blocks, work)?.into_iter().for_each(merge);
+    #[cfg(not(feature = "rayon"))]
+    for block in blocks {
+        merge(work(block)?);
+    }
+    Ok(())
+}
+
 /// Does every block of an output, given its first row; allocates nothing but what the pool itself does.
 ///
 /// # Errors

@@ -1,6 +1,6 @@
 //! An operator that stores no weights: right where a list of neighbors serves few applications.
 
-use super::blocks::{BLOCK, each_block, each_part};
+use super::blocks::{BLOCK, each_block_merged, each_part};
 use super::sweep::Sweep;
 use super::worker::{BATCH, Workers};
 use super::{Apply, Field, Report, check, check_results, scalars};
@@ -26,14 +26,14 @@ impl<'a, const D: usize, M: Method<D>, P: Neighbors<D>> MatrixFree<'a, D, M, P> 
     /// # Errors
     /// As [`Rows::assemble`](super::Rows::assemble).
     pub fn new(method: &'a M, neighbors: &'a P) -> Result<Self> {
-        let mut operator = Self::unchecked(method, neighbors);
+        let mut operator = Self::unchecked(method, neighbors, Workers::default());
         operator.check(&mut vec![(); neighbors.targets()], |_, _| ())?;
         Ok(operator)
     }
 
-    /// The same without a check, for rows that are checked another time.
-    pub(crate) fn unchecked(method: &'a M, neighbors: &'a P) -> Self {
-        Self { method, neighbors, report: Report::default(), workers: Workers::new() }
+    /// The same without a check, for rows that are checked another time, by workers of the caller's.
+    pub(crate) fn unchecked(method: &'a M, neighbors: &'a P, workers: Workers<D, M>) -> Self {
+        Self { method, neighbors, report: Report::default(), workers }
     }
 
     /// Checks every row and hands each to `row`, which gives its result.
@@ -45,10 +45,11 @@ impl<'a, const D: usize, M: Method<D>, P: Neighbors<D>> MatrixFree<'a, D, M, P> 
         out: &mut [T],
         row: impl Fn(usize, &Draft<D, M::Out>) -> T + Sync + Send,
     ) -> Result<()> {
-        let Self { method, neighbors, workers, .. } = &*self;
+        let Self { method, neighbors, workers, report } = self;
         method.validate(neighbors.targets(), neighbors.sources())?;
         let blocks = out.chunks_mut(BLOCK).enumerate().map(|(b, out)| (b * BLOCK, out));
-        let reports = each_block(blocks, |(first, out)| {
+        *report = Report::default();
+        let rows = |(first, out): (usize, &mut [T])| {
             workers.with(method, |worker| {
                 let mut report = Report::default();
                 for (batch, out) in (first..).step_by(BATCH).zip(out.chunks_mut(BATCH)) {
@@ -60,10 +61,9 @@ impl<'a, const D: usize, M: Method<D>, P: Neighbors<D>> MatrixFree<'a, D, M, P> 
                 }
                 Ok(report)
             })
-        })?;
-        self.report = Report::default();
-        reports.iter().for_each(|block| self.report.merge(block));
-        self.report.accept()
+        };
+        each_block_merged(blocks, rows, |block| report.merge(&block))?;
+        report.accept()
     }
 
     /// What the check of all rows found.

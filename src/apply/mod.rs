@@ -23,7 +23,7 @@ mod symmetric;
 mod upwind;
 mod upwind_dcpse;
 mod vector;
-mod worker;
+pub(crate) mod worker;
 
 pub use advect::Advect;
 pub use export::RawRows;

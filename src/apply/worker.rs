@@ -1,7 +1,8 @@
 //! One thread's part of making rows: gather, weights, and what is tried where a row is refused.
 
+use std::fmt;
 use std::ops::Range;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::{Error, NeighborError, OperatorError, Result};
 use crate::neighbors::Neighbors;
@@ -17,14 +18,28 @@ pub(super) struct Worker<const D: usize, M: Method<D>> {
     scratch: M::Scratch,
 }
 
-/// As many workers as work at a time, kept from one block of rows to the next.
-pub(super) struct Workers<const D: usize, M: Method<D>>(Mutex<Vec<Worker<D, M>>>);
+/// As many workers as work at a time, kept from one block of rows to the next; copies share them.
+pub(crate) struct Workers<const D: usize, M: Method<D>>(Arc<Mutex<Vec<Worker<D, M>>>>);
+
+impl<const D: usize, M: Method<D>> Default for Workers<D, M> {
+    fn default() -> Self {
+        Self(Arc::default())
+    }
+}
+
+impl<const D: usize, M: Method<D>> Clone for Workers<D, M> {
+    fn clone(&self) -> Self {
+        Self(Arc::clone(&self.0))
+    }
+}
+
+impl<const D: usize, M: Method<D>> fmt::Debug for Workers<D, M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Workers")
+    }
+}
 
 impl<const D: usize, M: Method<D>> Workers<D, M> {
-    pub(super) fn new() -> Self {
-        Self(Mutex::default())
-    }
-
     pub(super) fn with<R>(&self, method: &M, work: impl FnOnce(&mut Worker<D, M>) -> Result<R>) -> Result<R> {
         let spare = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut worker = match spare {

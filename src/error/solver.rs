@@ -146,6 +146,11 @@ kinds! {
             /// What an affine source would have there.
             expected: f64,
         } => "the source at u = 2 is {found}, where one affine in u would be {expected}",
+        /// A steady problem to whose solution any constant may be added.
+        OpenLevel {
+            /// Number of particles.
+            particles: usize,
+        } => "nothing fixes the level of u at the {particles} particles: give a value somewhere, a Robin condition or a source that decays",
         /// No neighbor upstream, and no inflow condition.
         NoUpstream {
             /// Axis along which the flow comes in, or the nearest one.

@@ -104,6 +104,11 @@ impl<M> DivGrad<M> {
         &self.laplacian
     }
 
+    /// The method and the diffusivities, to be brought up to date.
+    pub(crate) fn parts_mut(&mut self) -> (&mut M, &mut [f64]) {
+        (&mut self.laplacian, Arc::make_mut(&mut self.diffusivity))
+    }
+
     /// Multiplies the weights of the Laplacian by the means of their pairs, and the share of odd images with them.
     fn scale<const D: usize>(&self, row: &Stencil<D>, w: &mut [[f64; 1]], diagonal: &mut [f64; 1]) -> Result<()> {
         let Some(center) = row.center() else {

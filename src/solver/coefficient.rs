@@ -172,13 +172,26 @@ impl<F: Fn(&[f64; D]) -> [f64; D] + Sync, const D: usize> Velocity<D> for Steady
 /// # Errors
 /// [`ParticleError::Diffusivity`] naming the first particle where it is negative or not finite.
 pub(super) fn diffusivities<const D: usize>(of: &impl Diffusivity<D>, points: &[[f64; D]]) -> Result<Vec<f64>> {
+    let mut values = vec![0.0; points.len()];
+    renew_diffusivities(of, points, &mut values)?;
+    Ok(values)
+}
+
+/// The same in the place of others.
+pub(super) fn renew_diffusivities<const D: usize>(
+    of: &impl Diffusivity<D>,
+    points: &[[f64; D]],
+    values: &mut [f64],
+) -> Result<()> {
     of.validate(points.len())?;
-    let checked = |(p, x)| {
+    for ((p, x), value) in points.iter().enumerate().zip(values) {
         let diffusivity = of.at(p, x);
-        let legal = diffusivity >= 0.0 && diffusivity.is_finite();
-        if legal { Ok(diffusivity) } else { Err(Error::from(ParticleError::Diffusivity { diffusivity }).at(p)) }
-    };
-    points.iter().enumerate().map(checked).collect()
+        if !(diffusivity >= 0.0 && diffusivity.is_finite()) {
+            return Err(Error::from(ParticleError::Diffusivity { diffusivity }).at(p));
+        }
+        *value = diffusivity;
+    }
+    Ok(())
 }
 
 fn one_each(found: usize, needed: usize) -> Result<()> {

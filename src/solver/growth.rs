@@ -1,10 +1,11 @@
 //! Whether modes of a scene grow, whatever the step.
 
 use super::fields::Fields;
+use super::moving::{Moving, MovingScene};
 use super::policy::GrowthPolicy;
 use super::scene::Scene;
 use super::semi_discrete::SemiDiscrete;
-use crate::error::{Result, SolverError};
+use crate::error::{ErrorKind, LinearError, Result, SolverError};
 use crate::linear::{Spectrum, SpectrumEstimator};
 
 /// The largest legal growth rate over the spectral radius, for `f64` rows; for `f32` what their rounding moves eigenvalues
@@ -16,6 +17,9 @@ const RESOLUTION: f64 = 0.002;
 
 /// Products after which the estimate is taken as it is.
 const MOST: usize = 1000;
+
+/// The same on a set that has moved: modes that are not found in so few grow too slowly to matter before the set is another.
+const ON_THE_WAY: usize = 96;
 
 /// The largest legal growth rate over the spectral radius, for rows of these fields.
 pub(super) fn legal<E: Fields>() -> f64 {
@@ -70,6 +74,29 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
             return Err(SolverError::Growing { rate, radius, limit }.into());
         }
         Ok(spectrum.abscissa)
+    }
+}
+
+impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
+    /// The growth rate of the diffusion term on the set of the start; NaN where the policy asks for none.
+    pub(super) fn growth_at_the_start(&self, policy: GrowthPolicy) -> Result<f64> {
+        self.growth(policy, MOST)
+    }
+
+    /// The same on a set that has moved; NaN also where no spectrum is found, which is no proof of growth.
+    pub(super) fn growth_on_the_way(&self, policy: GrowthPolicy) -> Result<f64> {
+        match self.growth(policy, ON_THE_WAY) {
+            Err(error) if matches!(error.kind(), ErrorKind::Linear(LinearError::NotConverged { .. })) => Ok(f64::NAN),
+            found => found,
+        }
+    }
+
+    fn growth(&self, policy: GrowthPolicy, products: usize) -> Result<f64> {
+        match policy {
+            GrowthPolicy::Unknown => Ok(f64::NAN),
+            GrowthPolicy::Allow => Ok(self.spectrum(products)?.abscissa),
+            GrowthPolicy::Refuse => SemiDiscrete::<D, S>::check_growth(&self.spectrum(products)?),
+        }
     }
 }
 

@@ -8,11 +8,10 @@ use super::moving::{Moving, MovingScene, MovingState};
 use super::moving_diffusion::{MovingDiffusion, MovingSettings};
 use super::policy::{GrowthPolicy, StepPolicy};
 use super::remeshing::{Nodes, Remesher, Remeshing, Trigger, check, overlap_is_lost};
-use super::semi_discrete::SemiDiscrete;
 use super::watch::OverlapWatch;
 use crate::apply::Report;
 use crate::domain::Domain;
-use crate::error::{ErrorKind, Limit, LinearError, Result, SolverError, TimeError};
+use crate::error::{ErrorKind, Limit, Result, SolverError, TimeError};
 use crate::kernel::MeshKernel;
 use crate::mesh::Remeshed;
 use crate::particles::Particles;
@@ -21,11 +20,6 @@ use crate::time::{Entry, Plan, State, Stepper};
 
 /// The default constant C of the Lagrangian CFL condition dt |grad v|_2 <= C.
 pub const COURANT: f64 = 0.5;
-
-/// Products of an estimate of growth on the set of the start, and on one that has moved since: there, modes that are not
-/// found in so few grow too slowly to matter before the set is another.
-const AT_THE_START: usize = 1000;
-const ON_THE_WAY: usize = 96;
 
 /// A scene on particles that move with the flow, advanced by any stepper:
 ///
@@ -128,7 +122,8 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
             values: Vec::new(),
         };
         if report.is_some() {
-            (run.surveyed, run.ledger.growth) = (run.moving.searches().0, run.survey(AT_THE_START)?);
+            (run.surveyed, run.ledger.growth) =
+                (run.moving.searches().0, run.moving.growth_at_the_start(settings.growth)?);
         }
         run.certify(report.as_ref());
         run.measure();
@@ -249,6 +244,7 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
     ///
     /// # Errors
     /// [`SolverError::Limit`] for a step above the limit, [`SolverError::Substeps`] where cutting it does not help;
+    /// [`SolverError::Growing`] where modes of the diffusion term have come to grow since the neighbors were last searched;
     /// [`SolverError::Volume`] naming the particle whose volume would not stay positive; [`SolverError::OverlapLost`] where it
     /// is [watched](Self::watching); [`SolverError::Drift`] above the [`drift_budget`](Self::drift_budget);
     /// [`DomainError::Outside`](crate::DomainError::Outside) naming one that leaves the domain, and
@@ -296,11 +292,7 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
         }
         let searches = self.moving.searches().0;
         let growth = match report {
-            Some(_) if searches != self.surveyed => match self.survey(ON_THE_WAY) {
-                // A spectrum that is not found is no proof of growth.
-                Err(error) if matches!(error.kind(), ErrorKind::Linear(LinearError::NotConverged { .. })) => f64::NAN,
-                found => found?,
-            },
+            Some(_) if searches != self.surveyed => self.moving.growth_on_the_way(self.growth)?,
             _ => self.ledger.growth,
         };
         let mut work = std::mem::take(&mut self.work);
@@ -352,15 +344,6 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
         ledger.step += 1;
         ledger.retries += u64::from(substeps) - 1;
         Ok(&self.ledger)
-    }
-
-    /// How fast modes of the diffusion term grow on the set of now, found in so many products at the most.
-    fn survey(&self, products: usize) -> Result<f64> {
-        match self.growth {
-            GrowthPolicy::Unknown => Ok(f64::NAN),
-            GrowthPolicy::Allow => Ok(self.moving.spectrum(products)?.abscissa),
-            GrowthPolicy::Refuse => SemiDiscrete::<D, S>::check_growth(&self.moving.spectrum(products)?),
-        }
     }
 
     /// What bounds a step of length dt from a state at time t, by default that of the run, and what the check of the rows

@@ -64,6 +64,7 @@ pub(super) struct Moving<const D: usize, S: MovingScene<D>> {
     volume: Vec<f64>,
     u: Vec<S::Value>,
     places: Vec<[f64; D]>,
+    spare: Volumes,
     /// div(D grad u) as the last check found it, and its time; no time once it was used.
     spread: Vec<S::Value>,
     spread_at: Option<f64>,
@@ -104,6 +105,7 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
             volume: Vec::new(),
             u: Vec::new(),
             places: Vec::new(),
+            spare: Volumes::equal(1.0)?,
             spread: Vec::new(),
             spread_at: None,
         };
@@ -200,7 +202,9 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
             self.site.particles_mut().set_points(&self.places)?;
         }
         if !S::Advection::SOLENOIDAL {
-            let volumes = Volumes::each(state.1.1.clone())?;
+            // The diffusion term shares the volumes of before until it follows; those before them are free.
+            let mut volumes = std::mem::replace(&mut self.spare, self.site.particles().volumes()?.clone());
+            volumes.renew(&state.1.1)?;
             self.site.particles_mut().set_volumes(volumes)?;
         }
         self.scene.advection_term().renew(&mut self.values, &self.site, &self.domain, t)?;
@@ -250,7 +254,7 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
             if known {
                 each_row(domega, |p| finish(p, self.spread[p]));
             } else {
-                self.scene.diffusion_term().rates(&self.kept, &self.site, u, domega, finish)?;
+                self.scene.diffusion_term().rates(&self.kept, u, domega, finish)?;
             }
         }
         Ok(())
@@ -272,7 +276,7 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         }
         let mut limits = Limits::default();
         self.spread.resize(self.u.len(), S::Value::ZERO);
-        let checked = self.scene.diffusion_term().check(&self.kept, &self.site, &self.u, &mut self.spread)?;
+        let checked = self.scene.diffusion_term().check(&self.kept, &self.u, &mut self.spread)?;
         self.spread_at = checked.is_some().then_some(t);
         if let Some((report, factor)) = &checked {
             limits.add(Limit::Diffusion, Rate::decay(factor * report.spectral_bound));
@@ -296,7 +300,7 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
 
     /// The rightmost eigenvalue and the spectral radius of the diffusion rows of now, in so many products each.
     pub(super) fn spectrum(&self, products: usize) -> Result<Spectrum> {
-        self.scene.diffusion_term().spectrum(&self.kept, &self.site, products)
+        self.scene.diffusion_term().spectrum(&self.kept, products)
     }
 
     /// Whether V_p w_pq = V_q w_qp in the rows of now, found by applying them to two fields.
@@ -304,7 +308,7 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         let fields = probes::<S::Value>(self.site.points().len());
         let mut images = fields.clone();
         for (u, image) in fields.iter().zip(&mut images) {
-            self.scene.diffusion_term().rates(&self.kept, &self.site, u, image, |_, rate| rate)?;
+            self.scene.diffusion_term().rates(&self.kept, u, image, |_, rate| rate)?;
         }
         let volumes = self.volume(state);
         Ok(symmetry(&fields, &images, |p| volumes.get(p).copied().unwrap_or(1.0)))

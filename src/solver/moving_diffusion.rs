@@ -1,12 +1,12 @@
 //! div(D grad u) on particles that move: weights made anew wherever they are.
 
-use super::coefficient::{Diffusivity, diffusivities};
+use super::coefficient::{Diffusivity, diffusivities, renew_diffusivities};
 use super::diffusion::{Diffusion, check_contrast};
 use super::fields::Fields;
 use super::growth::legal;
 use super::policy::GrowthPolicy;
-use super::term::Site;
 use crate::apply::blocks::each_row;
+use crate::apply::worker::Workers;
 use crate::apply::{Apply, MatrixFree, MovingMethod, Report, Rows};
 use crate::domain::{Domain, Face};
 use crate::error::{ParticleError, Result};
@@ -83,14 +83,14 @@ pub trait MovingDiffusion<const D: usize, E: Fields>: Sync {
     ///
     /// # Errors
     /// Naming the particle whose row is illegal.
-    fn check(&self, kept: &Self::Kept, site: &Site<D>, u: &[E], out: &mut [E]) -> Result<Option<(Report, f64)>>;
+    fn check(&self, kept: &Self::Kept, u: &[E], out: &mut [E]) -> Result<Option<(Report, f64)>>;
 
     /// The rightmost eigenvalue and the spectral radius of the rows of now, each in at most so many products; zero without
     /// one where no weight is negative.
     ///
     /// # Errors
     /// As [`Rows::assemble`] and [`SpectrumEstimator::estimate`].
-    fn spectrum(&self, kept: &Self::Kept, site: &Site<D>, products: usize) -> Result<Spectrum>;
+    fn spectrum(&self, kept: &Self::Kept, products: usize) -> Result<Spectrum>;
 
     /// Writes `finish`(p, div(D grad u)_p) for every particle.
     ///
@@ -99,7 +99,6 @@ pub trait MovingDiffusion<const D: usize, E: Fields>: Sync {
     fn rates(
         &self,
         kept: &Self::Kept,
-        site: &Site<D>,
         u: &[E],
         out: &mut [E],
         finish: impl Fn(usize, E) -> E + Sync + Send,
@@ -141,22 +140,15 @@ impl<const D: usize, E: Fields> MovingDiffusion<D, E> for () {
         Ok(())
     }
 
-    fn check(&self, (): &(), _: &Site<D>, _: &[E], _: &mut [E]) -> Result<Option<(Report, f64)>> {
+    fn check(&self, (): &(), _: &[E], _: &mut [E]) -> Result<Option<(Report, f64)>> {
         Ok(None)
     }
 
-    fn spectrum(&self, (): &(), _: &Site<D>, _: usize) -> Result<Spectrum> {
+    fn spectrum(&self, (): &(), _: usize) -> Result<Spectrum> {
         Ok(Spectrum::default())
     }
 
-    fn rates(
-        &self,
-        (): &(),
-        _: &Site<D>,
-        _: &[E],
-        out: &mut [E],
-        finish: impl Fn(usize, E) -> E + Sync + Send,
-    ) -> Result<()> {
+    fn rates(&self, (): &(), _: &[E], out: &mut [E], finish: impl Fn(usize, E) -> E + Sync + Send) -> Result<()> {
         each_row(out, |p| finish(p, E::ZERO));
         Ok(())
     }
@@ -168,8 +160,8 @@ impl<const D: usize, E: Fields> MovingDiffusion<D, E> for () {
 
 /// A method and the neighbors it works on, both where the particles are.
 #[derive(Clone, Debug)]
-pub struct MovingRows<const D: usize, M> {
-    method: M,
+pub struct MovingRows<const D: usize, M: Method<D, Out = [f64; 1]>> {
+    term: Term<D, M>,
     list: VerletList<D>,
     domain: Domain<D>,
     cutoff: f64,
@@ -177,9 +169,45 @@ pub struct MovingRows<const D: usize, M> {
     earlier: u64,
 }
 
-impl<const D: usize, M> MovingRows<D, M> {
+/// The method with its diffusivity, and what threads make its rows with from one sweep to the next.
+#[derive(Clone, Debug)]
+enum Term<const D: usize, M: Method<D, Out = [f64; 1]>> {
+    Constant(M, f64, Workers<D, M>),
+    Varying(DivGrad<M>, Workers<D, DivGrad<M>>),
+}
+
+impl<const D: usize, M: Method<D, Out = [f64; 1]>> MovingRows<D, M> {
     fn within(&self) -> Within<'_, D> {
         Within { list: &self.list, cutoff: self.cutoff }
+    }
+}
+
+impl<const D: usize, M: MovingMethod<D>> Term<D, M> {
+    fn new<C: Diffusivity<D>>(diffusion: &Diffusion<C, M>, particles: &Particles<D>) -> Result<Self> {
+        let mut method = diffusion.method.clone();
+        method.set_volumes(particles.volumes()?);
+        match diffusion.diffusivity.constant() {
+            Some(diffusivity) if !(diffusivity >= 0.0 && diffusivity.is_finite()) => {
+                Err(ParticleError::Diffusivity { diffusivity }.into())
+            }
+            Some(diffusivity) => Ok(Self::Constant(method, diffusivity, Workers::default())),
+            None => {
+                let values = diffusivities(&diffusion.diffusivity, particles.points())?;
+                Ok(Self::Varying(DivGrad::new(method, values)?.mean(diffusion.mean), Workers::default()))
+            }
+        }
+    }
+
+    fn follow<C: Diffusivity<D>>(&mut self, diffusion: &Diffusion<C, M>, particles: &Particles<D>) -> Result<()> {
+        match self {
+            Self::Constant(method, ..) => method.set_volumes(particles.volumes()?),
+            Self::Varying(div_grad, _) => {
+                let (method, values) = div_grad.parts_mut();
+                method.set_volumes(particles.volumes()?);
+                renew_diffusivities(&diffusion.diffusivity, particles.points(), values)?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -205,11 +233,7 @@ impl<C: Diffusivity<D>, M: MovingMethod<D>, const D: usize, E: Fields> MovingDif
         domain: &Domain<D>,
         settings: MovingSettings,
     ) -> Result<MovingRows<D, M>> {
-        if let Some(diffusivity) = self.diffusivity.constant()
-            && !(diffusivity >= 0.0 && diffusivity.is_finite())
-        {
-            return Err(ParticleError::Diffusivity { diffusivity }.into());
-        }
+        let term = Term::new(self, particles)?;
         let [cutoff, reach] = match settings.cutoff {
             Some(cutoff) => [cutoff; 2],
             None => self.method.reach(particles, domain)?.map(|cutoff| cutoff.0),
@@ -222,70 +246,53 @@ impl<C: Diffusivity<D>, M: MovingMethod<D>, const D: usize, E: Fields> MovingDif
         let skin = settings.skin.unwrap_or((SKIN * reach).min(0.5 * (room - cutoff)).max(0.0));
         let reach = reach.min(room - skin).max(cutoff);
         let list = VerletList::build(particles, domain, Cutoff(reach), skin)?;
-        let mut method = self.method.clone();
-        method.set_volumes(particles.volumes()?);
-        Ok(MovingRows { method, list, domain: *domain, cutoff, earlier: 0 })
+        Ok(MovingRows { term, list, domain: *domain, cutoff, earlier: 0 })
     }
 
     fn restart(&self, kept: &MovingRows<D, M>, particles: &Particles<D>, searches: u64) -> Result<MovingRows<D, M>> {
         let list = VerletList::build(particles, &kept.domain, Cutoff(kept.list.reach()), kept.list.skin())?;
-        let mut method = kept.method.clone();
-        method.set_volumes(particles.volumes()?);
-        Ok(MovingRows { method, list, domain: kept.domain, cutoff: kept.cutoff, earlier: searches })
+        let term = Term::new(self, particles)?;
+        Ok(MovingRows { term, list, domain: kept.domain, cutoff: kept.cutoff, earlier: searches })
     }
 
     fn follow(&self, kept: &mut MovingRows<D, M>, particles: &Particles<D>) -> Result<()> {
         kept.list.update(particles)?;
-        kept.method.set_volumes(particles.volumes()?);
-        Ok(())
+        kept.term.follow(self, particles)
     }
 
     fn admits(&self, kept: &MovingRows<D, M>, spacing: Spacing) -> Result<()> {
         self.method.admits(spacing, Cutoff(kept.cutoff))
     }
 
-    fn check(&self, kept: &MovingRows<D, M>, site: &Site<D>, u: &[E], out: &mut [E]) -> Result<Option<(Report, f64)>> {
+    fn check(&self, kept: &MovingRows<D, M>, u: &[E], out: &mut [E]) -> Result<Option<(Report, f64)>> {
         let within = kept.within();
-        let (report, factor) = match self.diffusivity.constant() {
-            Some(factor) => (check(&kept.method, &within, factor, u, out)?, factor),
-            None => {
-                let values = diffusivities(&self.diffusivity, site.points())?;
-                let method = DivGrad::new(kept.method.clone(), values)?.mean(self.mean);
-                (check(&method, &within, 1.0, u, out)?, 1.0)
-            }
+        let (report, factor) = match &kept.term {
+            Term::Constant(method, factor, workers) => (check(method, &within, workers, *factor, u, out)?, *factor),
+            Term::Varying(method, workers) => (check(method, &within, workers, 1.0, u, out)?, 1.0),
         };
         check_contrast(&report)?;
         Ok(Some((report, factor)))
     }
 
-    fn spectrum(&self, kept: &MovingRows<D, M>, site: &Site<D>, products: usize) -> Result<Spectrum> {
+    fn spectrum(&self, kept: &MovingRows<D, M>, products: usize) -> Result<Spectrum> {
         let within = kept.within();
-        match self.diffusivity.constant() {
-            Some(factor) => spectrum(&kept.method, &within, factor, products),
-            None => {
-                let values = diffusivities(&self.diffusivity, site.points())?;
-                let method = DivGrad::new(kept.method.clone(), values)?.mean(self.mean);
-                spectrum(&method, &within, 1.0, products)
-            }
+        match &kept.term {
+            Term::Constant(method, factor, _) => spectrum(method, &within, *factor, products),
+            Term::Varying(method, _) => spectrum(method, &within, 1.0, products),
         }
     }
 
     fn rates(
         &self,
         kept: &MovingRows<D, M>,
-        site: &Site<D>,
         u: &[E],
         out: &mut [E],
         finish: impl Fn(usize, E) -> E + Sync + Send,
     ) -> Result<()> {
         let within = kept.within();
-        match self.diffusivity.constant() {
-            Some(factor) => sweep(&kept.method, &within, factor, u, out, finish),
-            None => {
-                let values = diffusivities(&self.diffusivity, site.points())?;
-                let method = DivGrad::new(kept.method.clone(), values)?.mean(self.mean);
-                sweep(&method, &within, 1.0, u, out, finish)
-            }
+        match &kept.term {
+            Term::Constant(method, factor, workers) => sweep(method, &within, workers, *factor, u, out, finish),
+            Term::Varying(method, workers) => sweep(method, &within, workers, 1.0, u, out, finish),
         }
     }
 
@@ -316,11 +323,12 @@ fn spectrum<const D: usize, M: Method<D, Out = [f64; 1]>>(
 fn check<const D: usize, M: Method<D, Out = [f64; 1]>, E: Fields>(
     method: &M,
     neighbors: &Within<'_, D>,
+    workers: &Workers<D, M>,
     factor: f64,
     u: &[E],
     out: &mut [E],
 ) -> Result<Report> {
-    let mut rows = MatrixFree::unchecked(method, neighbors);
+    let mut rows = MatrixFree::unchecked(method, neighbors, workers.clone());
     rows.check(out, |p, draft| rate(draft, factor, u, p))?;
     Ok(*rows.report())
 }
@@ -329,12 +337,13 @@ fn check<const D: usize, M: Method<D, Out = [f64; 1]>, E: Fields>(
 fn sweep<const D: usize, M: Method<D, Out = [f64; 1]>, E: Fields>(
     method: &M,
     neighbors: &Within<'_, D>,
+    workers: &Workers<D, M>,
     factor: f64,
     u: &[E],
     out: &mut [E],
     finish: impl Fn(usize, E) -> E + Sync + Send,
 ) -> Result<()> {
-    MatrixFree::unchecked(method, neighbors).each(out, |p, draft| finish(p, rate(draft, factor, u, p)))
+    MatrixFree::unchecked(method, neighbors, workers.clone()).each(out, |p, draft| finish(p, rate(draft, factor, u, p)))
 }
 
 /// factor sum_q w_pq (u_q - u_p) of one row.

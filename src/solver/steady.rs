@@ -5,7 +5,7 @@ use super::policy::GrowthPolicy;
 use super::scene::Scene;
 use super::semi_discrete::SemiDiscrete;
 use crate::error::{Error, Result, SolverError};
-use crate::linear::{SolveReport, SparseSolver};
+use crate::linear::{CsrMatrix, SolveReport, SparseSolver};
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
 
@@ -26,7 +26,7 @@ pub struct SteadyState<E> {
 ///
 /// By [`SparseSolver`]: sparse LU with the feature `faer`, otherwise GMRES. S and the boundary values are those of t = 0. A
 /// source of one field may be affine in u, S = a + b u, and b goes into the matrix; one of several fields may not depend
-/// on u. Without a boundary, or with fluxes alone, the system is singular unless the source decays.
+/// on u. Without a boundary, or with fluxes alone, nothing fixes the level of u unless the source decays.
 ///
 /// ```
 /// use parops::{AdvectionDiffusion, Boundary, BoundaryCondition, DcPse, Domain, Gradient, Laplacian, Nearest, Particles};
@@ -46,7 +46,7 @@ pub struct SteadyState<E> {
 ///
 /// # Errors
 /// As [`SemiDiscrete::new`]; [`SolverError::Unsteady`] for a velocity that depends on time; [`SolverError::NotAffine`] and
-/// [`SolverError::Source`] naming the particle; what [`SparseSolver::new`] and [`SparseSolver::solve`] refuse, naming
+/// [`SolverError::Source`] naming the particle; [`SolverError::OpenLevel`] where any constant may be added to u; what [`SparseSolver::new`] and [`SparseSolver::solve`] refuse, naming
 /// particles as rows.
 pub fn steady<const D: usize, S: Scene<D>, P: Neighbors<D>>(
     scene: S,
@@ -61,6 +61,9 @@ pub fn steady<const D: usize, S: Scene<D>, P: Neighbors<D>>(
     let zero = vec![S::Value::ZERO; count];
     let slopes = slopes(&discrete, &zero)?;
     let matrix = discrete.matrix_with(0.0, 0.0, |p| slopes.get(p).copied().unwrap_or(0.0))?;
+    if count > 0 && annihilates_constants(&matrix) {
+        return Err(SolverError::OpenLevel { particles: count }.into());
+    }
     let mut load = zero.clone();
     discrete.load(0.0, &zero, &mut load)?;
     let mut given = vec![false; count];
@@ -79,6 +82,14 @@ pub fn steady<const D: usize, S: Scene<D>, P: Neighbors<D>>(
         u.iter_mut().zip(&x).for_each(|(u, x)| u.set(i, *x));
     }
     Ok(SteadyState { u, report, condition: solver.condition()? })
+}
+
+/// Whether every row sums to zero, but for the rounding of its entries and of the diagonal, itself a sum of them.
+fn annihilates_constants(matrix: &CsrMatrix) -> bool {
+    (0..matrix.rows()).filter_map(|p| matrix.row(p)).all(|(_, row)| {
+        let (sum, size) = row.iter().fold((0.0, 0.0), |(sum, size), a| (sum + a, size + f64::abs(*a)));
+        f64::abs(sum) <= 2.0 * row.len() as f64 * f64::EPSILON * size
+    })
 }
 
 /// dS/du of a source that is affine in u, particle by particle.

@@ -3,9 +3,8 @@
 use std::f64::consts::TAU;
 
 use parops::{
-    AdvectionDiffusion, Carried, CellList, Cutoff, DcPse, Domain, ErrorKind, GrowthPolicy, Lagrangian, Laplacian,
-    MovingDiffusion, MovingScene, MovingSettings, MovingState, Particles, Result, Rk4, Scene, Site, SolverError,
-    Steady,
+    AdvectionDiffusion, Carried, DcPse, Domain, ErrorKind, GrowthPolicy, Lagrangian, Laplacian, MovingDiffusion,
+    MovingScene, MovingSettings, MovingState, Particles, Result, Rk4, Scene, SolverError, Steady,
 };
 
 use crate::dense;
@@ -49,8 +48,7 @@ fn exact_growth(ratio: f64, set: &Particles<2>) -> Result<f64> {
     let term = scene.diffusion_term();
     let kept = term.start(&lattice()?, &torus, MovingSettings::default())?;
     let kept = MovingDiffusion::<2, f64>::restart(term, &kept, set, 0)?;
-    let site = Site::new(set, &CellList::build(set, &torus, Cutoff(0.1))?)?;
-    let rates = |u: &[f64], du: &mut [f64]| term.rates(&kept, &site, u, du, |_, rate| rate);
+    let rates = |u: &[f64], du: &mut [f64]| term.rates(&kept, u, du, |_, rate| rate);
     Ok(dense::extremes(&dense::matrix(set.len(), rates)).0)
 }
 

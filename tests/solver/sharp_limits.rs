@@ -137,6 +137,9 @@ fn diffusion_limits_of_pse_are_sharp_on_scattered_sets_with_their_eigenvalues() 
     Ok(())
 }
 
+/// A scheme whose factor is the exponential series to so many stages.
+type Taylor = (fn() -> AnyStepper, u32);
+
 /// The longest step of the scheme with the factor sum_k z^k / k!, k up to `stages`, by bisection over all modes: its
 /// region is star-shaped.
 fn longest(modes: &[nalgebra::Complex<f64>], stages: u32) -> f64 {
@@ -155,17 +158,17 @@ fn sharp_by_modes<const D: usize, S: Scene<D, Value = f64>>(
     set: &Particles<D>,
     neighbors: &impl Neighbors<D>,
     of: Limit,
-    steppers: &[(fn() -> AnyStepper, u32)],
+    steppers: &[Taylor],
 ) -> Result<Vec<f64>> {
     let mut discrete = parops::SemiDiscrete::new(scene(), set, neighbors, GrowthPolicy::Unknown)?;
     let modes = dense::eigenvalues(&dense::matrix(set.len(), |u, du| discrete.rate(0.0, u, du)));
-    let limit = |&(stepper, stages): &(fn() -> AnyStepper, u32)| {
+    let limit = |&(stepper, stages): &Taylor| {
         sharp(scene(), set, neighbors, stepper, (of, Rate::frequency(1.0 / longest(&modes, stages))))
     };
     steppers.iter().map(limit).collect()
 }
 
-fn taylor() -> [(fn() -> AnyStepper, u32); 3] {
+fn taylor() -> [Taylor; 3] {
     [(|| Box::new(Euler::new()), 1), (|| Box::new(SspRk3::new()), 3), (|| Box::new(Rk4::new()), 4)]
 }
 

@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use parops::{
-    AdvectionDiffusion, Boundary, BoundaryCondition, CellList, DcPse, Domain, ErrorKind, Gradient, Laplacian,
-    LinearError, Nearest, Particles, Random, Result, SolverError, Steady, UpwindGradient, steady,
+    AdvectionDiffusion, Boundary, BoundaryCondition, CellList, DcPse, Domain, ErrorKind, Face, Gradient, Laplacian,
+    Nearest, Particles, Random, Result, SolverError, Steady, UpwindGradient, steady,
 };
 
 fn rod(n: usize, jitter: f64) -> Result<Particles<1>> {
@@ -127,16 +127,37 @@ fn what_has_no_steady_state_is_refused() -> Result<()> {
         (error.particle(), matches!(error.kind(), ErrorKind::Solver(SolverError::Source { .. }))),
         (Some(20), true)
     );
+    Ok(())
+}
 
-    // Fluxes alone leave a constant open, and this source has no balance.
+#[test]
+fn level_that_nothing_fixes_is_refused_and_what_fixes_it_is_seen() -> Result<()> {
+    let rod = rod(40, 0.0)?;
+    let neighbors = Nearest::build(&rod, &Domain::open(), 8)?;
+    let scene = || AdvectionDiffusion::<1>::new().diffusion(1.0, DcPse::<Laplacian<1>, 2>::new());
+    // Whether or not the source has a balance.
+    let open = ErrorKind::Solver(SolverError::OpenLevel { particles: 41 });
     let walls = [BoundaryCondition::neumann(0, [-1.0]), BoundaryCondition::neumann(40, [1.0])];
-    let open = scene().source(|_, _, _| 1.0).boundary(Boundary::new(2).conditions(walls), |_, _, _| 0.0);
-    let error = steady(open, &rod, &neighbors).unwrap_err();
-    let singular = LinearError::Singular { condition: 0.0 };
-    assert!(
-        matches!(error.kind(), ErrorKind::Linear(kind) if std::mem::discriminant(kind) == std::mem::discriminant(&singular)
-        || matches!(kind, LinearError::NotConverged { .. } | LinearError::ZeroPivot { .. })),
-        "{error}"
-    );
+    let fluxes = || Boundary::new(2).conditions(walls);
+    for source in [0.0, 1.0] {
+        let fluxes = scene().source(move |_, _, _| source).boundary(fluxes(), |_, _, _| 0.0);
+        assert_eq!(*steady(fluxes, &rod, &neighbors).unwrap_err().kind(), open);
+    }
+    assert_eq!(*steady(scene(), &rod, &neighbors).unwrap_err().kind(), open);
+
+    let robin = [BoundaryCondition::neumann(0, [-1.0]), BoundaryCondition::robin(40, [1.0], 1.0, 1.0)];
+    let held = steady(scene().boundary(Boundary::new(2).conditions(robin), |_, _, _| 0.0), &rod, &neighbors)?;
+    assert!(held.u.iter().all(|&u| u == 0.0));
+    let decaying = steady(scene().source(|_, _, u| 1.0 - u).boundary(fluxes(), |_, _, _| 0.0), &rod, &neighbors)?;
+    // The residual of the solve times the condition of the matrix, below 1e4.
+    assert!(decaying.u.iter().all(|u| (u - 1.0).abs() < 1e-9));
+
+    let cells = Particles::lattice([0.0], [1.0], [40])?;
+    let mirrors = Domain::new([0.0], [1.0], [[Face::MirrorOdd, Face::MirrorEven]])?;
+    let bump = |x: &[f64; 1]| (0.5 * PI * x[0]).sin();
+    let source = scene().source(move |x, _, _| 0.25 * PI * PI * bump(x));
+    let mirrored = steady(source, &cells, &Nearest::build(&cells, &mirrors, 8)?)?;
+    // Neighbors as far as 4 h: 2 (4 h)^2/4! u/u with u/u'' = (pi/2)^2.
+    assert!(worst(cells.points(), &mirrored.u, bump) < 3.3 * 40.0_f64.powi(-2));
     Ok(())
 }
