@@ -1,5 +1,6 @@
 //! Stiff and extreme cases: the failure modes that are known of particle methods, each with what a naive method does,
-//! measured, and what the library does about it: detects, reports, adapts, prevents or documents.
+//! measured, and what the library does about it: detects, reports, adapts, prevents or documents. Then the bad inputs, each
+//! with the error it is refused by, and the eigenvalues of advection and diffusion over the stability regions.
 //!
 //! Prints set-up, naive outcome, own outcome and verdict of each case, writes `extremes.csv` and `extremes.html` (one page
 //! that needs no network), and exits with 1 where an outcome is not the documented one, or where the naive method does not
@@ -8,10 +9,17 @@
 //! `cargo run --release --features faer --example extremes [-- --quick] [-- --out DIR]`
 
 mod case;
+#[path = "../../tests/linear/dense/mod.rs"]
+mod dense;
 mod failures;
+#[allow(dead_code)]
+#[path = "../figure/mod.rs"]
+mod figure;
+mod inputs;
 #[path = "../options/mod.rs"]
 mod options;
 mod page;
+mod stability;
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -25,7 +33,11 @@ fn main() -> ExitCode {
 }
 
 /// The catalogues, each with its name and the number of its entries.
-const CATALOGUES: [(&str, &[Entry], u32); 1] = [("Failure modes", &failures::ENTRIES, 32)];
+const CATALOGUES: [(&str, &[Entry], u32); 3] = [
+    ("Failure modes", &failures::ENTRIES, 32),
+    ("Bad inputs", &inputs::ENTRIES, 66),
+    ("Spectra", &stability::ENTRIES, 2),
+];
 
 /// Runs all cases; whether every one holds.
 fn extremes(options: &Options) -> Result<bool, Box<dyn Error>> {
@@ -46,7 +58,8 @@ fn extremes(options: &Options) -> Result<bool, Box<dyn Error>> {
     }
     let lines: Vec<String> = cases.iter().map(Case::csv).collect();
     std::fs::write(options.out.join("extremes.csv"), format!("{}\n{}\n", Case::HEADER, lines.join("\n")))?;
-    std::fs::write(options.out.join("extremes.html"), page::render(&cases, &[]))?;
+    let figures = stability::figures(&options.out)?;
+    std::fs::write(options.out.join("extremes.html"), page::render(&cases, &figures))?;
     let held = cases.iter().filter(|case| case.holds()).count();
     println!("{held} of {} cases end as documented", cases.len());
     println!("written to {} after {:.1} s", options.out.display(), start.elapsed().as_secs_f64());

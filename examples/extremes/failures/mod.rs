@@ -2,13 +2,13 @@
 
 mod consistency;
 mod moments;
-mod naive_dcpse;
+pub mod naive_dcpse;
 mod neighbors;
 mod overlap;
 mod remesh;
-mod ring;
-mod sets;
-mod spectra;
+pub mod ring;
+pub mod sets;
+pub mod spectra;
 mod steps;
 
 use crate::case::Duty::{Adapt, Detect, Document, Prevent, Report};

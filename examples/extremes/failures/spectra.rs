@@ -12,10 +12,10 @@ use crate::case::Case;
 
 type Done = Result<(), Box<dyn Error>>;
 
-const VELOCITY: [f64; 2] = [0.8, -0.6];
+pub const VELOCITY: [f64; 2] = [0.8, -0.6];
 
 /// The gradient of order 2 in the '-' form, which grows fastest.
-fn gradient() -> parops::Result<DcPse<Gradient<2>, 2>> {
+pub fn gradient() -> parops::Result<DcPse<Gradient<2>, 2>> {
     DcPse::<Gradient<2>, 2>::new().sign(Sign::Minus).neighbors_per_condition(1.5)
 }
 
@@ -51,7 +51,7 @@ fn rk4(
 }
 
 /// -v . grad u from the rows of a gradient.
-fn advect(rows: &Rows<[f64; 2]>, u: &[f64], du: &mut [f64]) -> parops::Result<()> {
+pub fn advect(rows: &Rows<[f64; 2]>, u: &[f64], du: &mut [f64]) -> parops::Result<()> {
     rows.apply_along(&vec![VELOCITY.map(|v| -v); u.len()], u, du)
 }
 
