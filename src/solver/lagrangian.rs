@@ -333,8 +333,8 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
             }
         }
         self.t = end;
-        if let Some(overlap) = overlap {
-            (self.ledger.hole, self.ledger.gap) = overlap;
+        if let Some((hole, gap)) = overlap {
+            (self.ledger.hole, self.ledger.gap) = (Some(hole), Some(gap));
         }
         self.certify(report.as_ref());
         self.measure();

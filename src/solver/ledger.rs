@@ -132,11 +132,11 @@ pub struct LedgerRow<const D: usize> {
     pub remeshings: u64,
     /// How often the neighbors of moving particles were searched anew so far, remeshings included.
     pub rebuilds: u64,
-    /// The largest hole when it was measured last, in spacings of the mesh, see [`OverlapWatch`](super::OverlapWatch); NaN
-    /// where nobody asked.
-    pub hole: f64,
+    /// The largest hole when it was measured last, in spacings of the mesh, see [`OverlapWatch`](super::OverlapWatch); none
+    /// where nobody asked (NaN in the text).
+    pub hole: Option<f64>,
     /// The least gap then.
-    pub gap: f64,
+    pub gap: Option<f64>,
     /// The largest legal |drift| over size; infinite where none is set.
     pub budget: f64,
     /// The totals, field by field.
@@ -160,8 +160,8 @@ impl<const D: usize> LedgerRow<D> {
             residual: 0.0,
             remeshings: 0,
             rebuilds: 0,
-            hole: f64::NAN,
-            gap: f64::NAN,
+            hole: None,
+            gap: None,
             budget: f64::INFINITY,
             fields: vec![Totals::NOTHING; fields],
         }
@@ -241,7 +241,8 @@ impl<const D: usize> LedgerRow<D> {
         write!(out, ",{},{},{:e}", self.substeps, self.retries, self.growth)?;
         write!(out, ",{:e},{:e}", self.condition, self.residual)?;
         write!(out, ",{},{}", self.remeshings, self.rebuilds)?;
-        write!(out, ",{:e},{:e},{:e}", self.hole, self.gap, self.budget)?;
+        let [hole, gap] = [self.hole, self.gap].map(|found| found.unwrap_or(f64::NAN));
+        write!(out, ",{hole:e},{gap:e},{:e}", self.budget)?;
         for field in &self.fields {
             let Totals { mass, size, min, max, negative_mass, drift, dropped, dropped_size, .. } = field;
             write!(out, ",{mass:e},{size:e},{min:e},{max:e},{negative_mass:e},{drift:e},{dropped:e},{dropped_size:e}")?;
