@@ -193,7 +193,7 @@ fn diffusion(case: &mut Case, _: bool) -> std::result::Result<(), Box<dyn Error>
 
 /// Advection without and with hyperviscosity.
 fn advection(case: &mut Case, _: bool) -> std::result::Result<(), Box<dyn Error>> {
-    case.setup(format!("-v . grad by DC-PSE of order 2 ('-', 14 neighbors), |v| = 1, the same particles, without and with hyperviscosity"));
+    case.setup("-v . grad by DC-PSE of order 2 ('-', 14 neighbors), |v| = 1, the same particles, without and with hyperviscosity");
     let Spectra { bare, damped, gamma, limits, .. } = Spectra::measure()?;
     let radius = bare.iter().fold(0.0_f64, |most, z| most.max(z.norm()));
     let right = |values: &[C]| values.iter().fold(f64::NEG_INFINITY, |most, z| most.max(z.re)) * H;

@@ -23,7 +23,8 @@ fn faces(case: &mut Case, lower: f64, upper: f64) -> parops::Result<()> {
 /// 24. A box without inside.
 pub fn reversed(case: &mut Case, _: bool) -> Done {
     case.setup("faces at 1 and 1, and at 2 and 1");
-    let naive = 0.25_f64.rem_euclid(1.0 - 1.0);
+    let [lower, upper] = [1.0, 1.0];
+    let naive = 0.25_f64.rem_euclid(upper - lower);
     case.naive(naive.is_nan(), format!("a coordinate modulo the width is {naive}"));
     faces(case, 1.0, 1.0)?;
     Ok(faces(case, 2.0, 1.0)?)
@@ -309,6 +310,6 @@ pub fn tie(case: &mut Case, _: bool) -> Done {
     }
     let pairs: usize = found[0].iter().map(Vec::len).sum();
     case.prevents(same, format!("every provider compares the same bits: {pairs} pairs, the same ones"));
-    case.prevents(same && pairs % 2 == 0, "each pair from both of its sides");
+    case.prevents(same && pairs.is_multiple_of(2), "each pair from both of its sides");
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! Bad operators and bad stencils.
 
 use std::error::Error;
+use std::f64::consts::TAU;
 
 use parops::{
     Apply, CellList, Cutoff, DcPse, Epsilon, ErrorKind, Expression, Form, KernelError, Laplacian, MultiIndex,
@@ -27,7 +28,7 @@ fn epsilon(case: &mut Case, bad: f64, naive: f64) -> Done {
 }
 
 fn gaussian(epsilon: f64) -> f64 {
-    1.0 / (std::f64::consts::TAU.sqrt() * epsilon)
+    1.0 / (TAU.sqrt() * epsilon)
 }
 
 /// 40. An epsilon of zero.
@@ -136,7 +137,7 @@ fn row_of(separations: &[[f64; 2]]) -> parops::Result<NeighborList<2>> {
 pub fn on_a_circle(case: &mut Case, _: bool) -> Done {
     case.setup("24 neighbors on one circle about the particle: x^3 + x y^2 is r^2 x there, d3/dx3");
     let separations: Vec<[f64; 2]> = (0..24)
-        .map(|i| f64::from(i) / 24.0 * std::f64::consts::TAU + 0.1)
+        .map(|i| f64::from(i) / 24.0 * TAU + 0.1)
         .map(|angle| [2.0 * H * angle.cos(), 2.0 * H * angle.sin()])
         .collect();
     let row = naive_dcpse::row(&separations, [3, 0], 1, H);
@@ -300,7 +301,7 @@ pub fn unequal_volumes(case: &mut Case, _: bool) -> Done {
     let torus = parops::Domain::periodic([0.0; 2], [1.0; 2])?;
     let h = 1.0 / 20.0;
     let volumes: Vec<f64> = (0..400).map(|p| h * h * (1.0 + 0.1 * f64::from(p % 2))).collect();
-    let f: Vec<f64> = lattice.points().iter().map(|x| (6.28 * x[0]).sin() + x[1]).collect();
+    let f: Vec<f64> = lattice.points().iter().map(|x| (TAU * x[0]).sin() + x[1]).collect();
     let method = Pse::new(Laplacian::<2>, 2, Epsilon::global(1.6 * h)?, &Volumes::each(volumes.clone())?)?
         .moment_tolerance(1.0)?;
     let cells = CellList::build(&lattice, &torus, method.cutoff())?;

@@ -1,12 +1,13 @@
 //! Bad fields, steps, functions and writers.
 
 use std::error::Error;
+use std::f64::consts::TAU;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use parops::{
-    AdvectionDiffusion, Apply, ApplyError, Central, DcPse, ErrorKind, Eulerian, Face, Gradient, IoError, Lambda,
-    Laplacian, Limit, Mesh, MeshError, Nearest, Particles, Rk4, SolverError, StepPolicy, TimeError, Vtu,
+    AdvectionDiffusion, Apply, ApplyError, COURANT, Central, DcPse, ErrorKind, Eulerian, Face, Gradient, IoError,
+    Lambda, Laplacian, Limit, Mesh, MeshError, Nearest, Particles, Rk4, SolverError, StepPolicy, TimeError, Vtu,
 };
 
 use super::world::{SIDE, World, refused};
@@ -35,7 +36,7 @@ pub fn stale_rows(case: &mut Case, _: bool) -> Done {
     case.setup("the particles of the world take the places of another jittered set, its rows stay");
     let mut now = World::new()?;
     let other = Particles::jittered([0.0; 2], [1.0; 2], [SIDE; 2], 0.2, 77)?;
-    let f: Vec<f64> = other.points().iter().map(|x| (6.28 * x[0]).sin()).collect();
+    let f: Vec<f64> = other.points().iter().map(|x| (TAU * x[0]).sin()).collect();
     let mut out = vec![0.0; N];
     now.rows.apply(&f, &mut out)?;
     let miss = out.iter().zip(&f).map(|(out, f)| (out + 39.4 * f).abs()).fold(0.0, f64::max) / 39.4;
@@ -128,11 +129,12 @@ pub fn above_limits(case: &mut Case, _: bool) -> Done {
     let near = Nearest::build(&lattice, &world.torus, 20)?;
     let flow = AdvectionDiffusion::<2>::new().advection([1.0, 0.5], Central(DcPse::<Gradient<2>, 2>::new()));
     let mut run = Eulerian::new(flow, &lattice, &near, Rk4::new())?;
-    let mut wave = lattice.points().iter().map(|x| (6.28 * x[0]).sin()).collect::<Vec<f64>>();
+    let mut wave = lattice.points().iter().map(|x| (TAU * x[0]).sin()).collect::<Vec<f64>>();
     let longest = run.longest_step(&wave)?;
     refused(case, &mut wave, None, due(Limit::Advection), |_, wave| run.step(wave, 1.5 * longest).map(drop))?;
     let mut moving = ring::run(64, 1.0, 0.5)?.remeshing(ring::each_step(64)?)?;
-    let (longest, start) = (0.5 / 0.5, moving.strengths().to_vec());
+    // The wave of the ring is 0.5 high.
+    let (longest, start) = (COURANT / 0.5, moving.strengths().to_vec());
     let steepest = ring::run(64, 1.0, 0.5)?.remeshing(ring::each_step(64)?)?.step(1.5 * longest).err();
     let named = steepest.and_then(|error| error.particle());
     refused(case, &mut start.clone(), named, due(Limit::Distortion), |_, _| moving.step(1.5 * longest).map(drop))?;
