@@ -302,12 +302,12 @@ pub fn tie(case: &mut Case, _: bool) -> Done {
         rows(&|p, row| list.for_each(p, cutoff, |q| row.push(q.q))),
         rows(&|p, row| verlet.for_each(p, cutoff, |q| row.push(q.q))),
     ];
-    let mut same = found.windows(2).all(|pair| pair[0] == pair[1]);
+    let same = found.windows(2).all(|pair| pair[0] == pair[1]);
     #[cfg(feature = "kiddo")]
-    {
+    let same = {
         let tree = parops::KdTree::build(&lattice, &torus, Cutoff(cutoff))?;
-        same &= found[0] == rows(&|p, row| tree.for_each(p, cutoff, |q| row.push(q.q)));
-    }
+        same && found[0] == rows(&|p, row| tree.for_each(p, cutoff, |q| row.push(q.q)))
+    };
     let pairs: usize = found[0].iter().map(Vec::len).sum();
     case.prevents(same, format!("every provider compares the same bits: {pairs} pairs, the same ones"));
     case.prevents(same && pairs.is_multiple_of(2), "each pair from both of its sides");
