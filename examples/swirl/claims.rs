@@ -107,11 +107,16 @@ fn overlap(records: &[Record]) -> Vec<(String, bool)> {
 fn winding([left, remeshed]: &[Wound; 2]) -> Vec<(String, bool)> {
     let [worn, fresh] = [left.condition, remeshed.condition];
     let [lost, kept] = [left.drift.abs(), remeshed.drift.abs()];
+    let refused = left.refused.unwrap_or(f64::NAN);
     vec![
         (
             format!(
-                "diffusion by DC-PSE bears a lost overlap, at conditions to {worn:.0} where remeshing keeps {fresh:.1}"
+                "not remeshed, diffusion by DC-PSE comes to grow and is refused at t = {refused:.2}; remeshed it is not"
             ),
+            refused > 0.0 && remeshed.refused.is_none(),
+        ),
+        (
+            format!("allowed to, it goes on at conditions to {worn:.0} where remeshing keeps {fresh:.1}"),
             worn > 4.0 * fresh && worn < 1e3,
         ),
         (format!("and loses more of the mass: {lost:.0e} against {kept:.0e}"), lost > 2.0 * kept),
