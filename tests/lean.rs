@@ -226,8 +226,8 @@ fn upwind_takes_rows_and_places_and_sweeps_once_a_step() -> Result<()> {
     assert!(stepped.is_ok() && within(first.held, 2.0 * NUMBER), "{first:?}");
     calls.store(0, Relaxed);
     let (stepped, later) = cost(|| (0..5).try_for_each(|_| run.step(&mut u, 1e-4).map(drop)));
-    // One velocity a particle for its row, one for the limit of the step.
-    assert_eq!((stepped, later.peak, later.allocations, calls.load(Relaxed)), (Ok(()), 0.0, 0, 5 * 2 * N));
+    // One velocity a particle for its row, one each for the limits at both ends of the step, because it may change.
+    assert_eq!((stepped, later.peak, later.allocations, calls.load(Relaxed)), (Ok(()), 0.0, 0, 5 * 3 * N));
     Ok(())
 }
 
@@ -259,8 +259,8 @@ fn remeshed_particles_take_places_and_strengths_and_no_rows() -> Result<()> {
     for remeshed in [false, false, true, false, false, false, true] {
         calls.store(0, Relaxed);
         let (stepped, step) = cost(|| run.step(1e-4).map(drop));
-        // The four stages, and four differences and the velocity itself for |grad v|.
-        assert_eq!((stepped, calls.load(Relaxed)), (Ok(()), (4 + 5) * N));
+        // The four stages, and four differences and the velocity itself for |grad v| at both ends of the step.
+        assert_eq!((stepped, calls.load(Relaxed)), (Ok(()), (4 + 2 * 5) * N));
         if remeshed {
             // Values on the mesh, new particles with strengths and volumes, and lists of the nodes in use.
             assert!(step.peak <= 2.0 * POINT + 4.0 * NUMBER && step.allocations <= 32, "{step:?}");
@@ -274,8 +274,8 @@ fn remeshed_particles_take_places_and_strengths_and_no_rows() -> Result<()> {
 
 #[test]
 fn implicit_steps_take_rows_and_three_matrices() -> Result<()> {
-    /// Of BiCGSTAB 8, of the scheme 7, of the solver 4, of the factors 1.
-    const VECTORS: f64 = 20.0;
+    /// Of BiCGSTAB 8, of the scheme 8, of the solver 4, of the factors 1.
+    const VECTORS: f64 = 21.0;
     /// Of the estimate of growth: 33 of its space, and those that go through the scene.
     const SPACE: f64 = 40.0;
     let set = scattered()?;

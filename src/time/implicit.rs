@@ -259,7 +259,18 @@ impl<E: Entry> Implicit<E> {
                 dt * (rate + later)
             };
         }
-        let report = solver.solve(right, x)?;
+        let mut report = solver.solve(right, x)?;
+        // Where the increment is larger than the state, as in the first steps of a rough field, the residual is to be small
+        // beside the state: what the first solve left is solved for once more.
+        let largest = |x: &mut dyn Iterator<Item = f64>| x.fold(0.0_f64, |most, x| most.max(x.abs()));
+        if largest(&mut right.iter().copied()) > largest(&mut u.iter().map(|u| u.number(k))) {
+            a.product_by_differences(sums, x, rate);
+            for (p, (right, rate)) in right.iter_mut().zip(&*rate).enumerate() {
+                *right -= if algebraic[p] { *rate } else { x[p] - *theta * dt * rate };
+            }
+            report.iterations += solver.solve(right, rate)?.iterations;
+            x.iter_mut().zip(&*rate).for_each(|(x, more)| *x += more);
+        }
         for ((next, u), x) in next.iter_mut().zip(u).zip(&*x) {
             next.set_number(k, u.number(k) + x);
         }
