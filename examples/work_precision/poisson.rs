@@ -10,7 +10,8 @@ use std::error::Error;
 
 use parops::report::{Phase, Sample, observed_order};
 use parops::{
-    BiCgStab, BoundaryRows, CsrMatrix, DcPse, DivGrad, Domain, Gmres, Gradient, Laplacian, Nearest, SparseSolver,
+    BiCgStab, BoundaryRows, CsrMatrix, DcPse, DivGrad, Domain, ErrorKind, Gmres, Gradient, Laplacian, LinearError,
+    Nearest, SparseSolver,
 };
 
 use crate::bench::Bench;
@@ -27,6 +28,9 @@ const BAND: f64 = 0.3;
 /// How far the errors of two solvers may be apart, relative to them, and what the residual leaves of each.
 const SAME: f64 = 0.01;
 const SOLVED: f64 = 1e-11;
+/// Products of an iteration with useless factors, and the relative residual they leave.
+const MOST: usize = 400;
+const USELESS: f64 = 1e-3;
 
 type Solver = (&'static str, fn(CsrMatrix) -> parops::Result<SparseSolver>);
 
@@ -48,6 +52,7 @@ pub fn run(bench: &mut Bench) -> Result<(), Box<dyn Error>> {
     }
     refine(bench, "ball", 6, &across[..across.len().min(3)], ball)?;
     claims(bench);
+    numbering(bench)?;
     Ok(())
 }
 
@@ -84,16 +89,8 @@ fn solve<const D: usize>(
     };
     let right = right(set);
     bench.sample(what, |watch, sample| {
-        let laplacian = DcPse::at_order(Laplacian::<D>, order)?;
-        let normal = DcPse::at_order(Gradient::<D>, order)?.neighbors_per_condition(NEUMANN_RATIO)?;
-        let needed = laplacian.fewest_neighbors::<D>()?.max(normal.fewest_neighbors::<D>()?);
-        let neighbors = watch.time(Phase::Neighbors, || Nearest::build(&set.particles, &Domain::open(), needed))?;
-        let matrix = watch.time(Phase::Build, || {
-            let coefficient: Vec<f64> = points.iter().map(diffusivity).collect();
-            let mut matrix = DivGrad::new(laplacian, coefficient)?.assemble(&neighbors)?.to_csr(0)?;
-            BoundaryRows::build(&set.conditions(), order, &neighbors)?.replace_in(&mut matrix)?;
-            parops::Result::Ok(matrix)
-        })?;
+        let neighbors = watch.time(Phase::Neighbors, || near(set, order))?;
+        let matrix = watch.time(Phase::Build, || matrix(set, order, &neighbors))?;
         sample.neighbors = matrix.entries() as f64 / points.len() as f64;
         let mut u = vec![0.0; points.len()];
         let solved = watch.time(Phase::Step, || make(matrix)?.solve(&right, &mut u))?;
@@ -102,6 +99,21 @@ fn solve<const D: usize>(
         Ok(())
     })?;
     Ok(())
+}
+
+/// As many neighbors as the rows of the Laplacian and of normal derivatives need.
+fn near<const D: usize>(set: &Round<D>, order: u32) -> parops::Result<Nearest<D>> {
+    let laplacian = DcPse::at_order(Laplacian::<D>, order)?.fewest_neighbors::<D>()?;
+    let normal = DcPse::at_order(Gradient::<D>, order)?.neighbors_per_condition(NEUMANN_RATIO)?;
+    Nearest::build(&set.particles, &Domain::open(), laplacian.max(normal.fewest_neighbors::<D>()?))
+}
+
+fn matrix<const D: usize>(set: &Round<D>, order: u32, neighbors: &Nearest<D>) -> parops::Result<CsrMatrix> {
+    let coefficient: Vec<f64> = set.particles.points().iter().map(diffusivity).collect();
+    let interior = DivGrad::new(DcPse::at_order(Laplacian::<D>, order)?, coefficient)?;
+    let mut matrix = interior.assemble(neighbors)?.to_csr(0)?;
+    BoundaryRows::build(&set.conditions(), order, neighbors)?.replace_in(&mut matrix)?;
+    Ok(matrix)
 }
 
 /// -S inside; u or du/dn on the boundary.
@@ -137,4 +149,35 @@ fn claims(bench: &mut Bench) {
         }
     }
     found.into_iter().for_each(|(holds, text)| bench.claim(SCENE, holds, text));
+}
+
+/// ILU(0) takes rows in their order: with those of normal derivatives first its factors are useless.
+fn numbering(bench: &mut Bench) -> parops::Result<()> {
+    let (set, order) = (disc(36)?, 8);
+    let (matrix, right) = (matrix(&set, order, &near(&set, order)?)?, right(&set));
+    let (n, rim) = (matrix.rows(), set.boundary.len());
+    let turned = |p: usize| (p + rim) % n;
+    let swapped = matrix.triplets().map(|(p, q, w)| (turned(p), turned(q), w));
+    let first = CsrMatrix::from_triplets(n, n, swapped)?;
+    let mut right_first = right.clone();
+    right_first.rotate_right(rim);
+    let mut u = vec![0.0; n];
+    let mut solve = |matrix: CsrMatrix, right: &[f64]| {
+        let gmres = Gmres::new().tolerance(TOLERANCE)?.most(MOST);
+        SparseSolver::gmres(matrix, gmres)?.solve(right, &mut u)
+    };
+    let products = solve(matrix, &right)?.iterations;
+    let left = match solve(first, &right_first) {
+        Ok(_) => 0.0,
+        Err(error) => match *error.kind() {
+            ErrorKind::Linear(LinearError::NotConverged { residual, .. }) => residual,
+            _ => return Err(error),
+        },
+    };
+    let text = format!(
+        "disc, DC-PSE {order}, {n} particles: GMRES takes {products} products where boundary particles are numbered \
+         last; where they are first, {MOST} leave a relative residual of {left:.0e}"
+    );
+    bench.claim(SCENE, products < MOST / 10 && left > USELESS, text);
+    Ok(())
 }
