@@ -1,0 +1,187 @@
+//! Promises with their bounds, asserted where they are measured and recorded for a table.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::fmt::Debug;
+use std::fs::{OpenOptions, create_dir_all};
+use std::io::Write;
+use std::path::PathBuf;
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::{env, thread};
+
+use super::verification::Line;
+
+/// One promise and its bound: an assertion that leaves a line for a [`Verification`](super::Verification).
+///
+/// A test states section and promise, and what it measured beside the bound. Where the environment variable
+/// `PAROPS_PROMISES` names a directory, a line with bound, measured value, verdict and the name of the test is appended
+/// to a file there before a broken promise panics. Promises repeated in a test are one line, of the worst that was
+/// measured. Nothing is recorded outside a thread that bears the name of a test.
+///
+/// ```
+/// use parops::testing::Promise;
+/// let sum = [0.1_f64; 10].iter().sum::<f64>();
+/// Promise::new("Sums", "ten tenths are one").in_units("eps", f64::EPSILON).at_most(4.5, (sum - 1.0).abs());
+/// ```
+///
+/// # Panics
+/// Every verb panics where its promise is broken, and where one test states a promise with two bounds.
+#[derive(Clone, Copy, Debug)]
+#[must_use = "a promise is checked by its last verb"]
+pub struct Promise {
+    section: &'static str,
+    text: &'static str,
+    unit: Option<(&'static str, f64)>,
+    aim: Option<(f64, &'static str)>,
+}
+
+/// How bad the worst of a line was, and its bound.
+type Worst = HashMap<(&'static str, &'static str), (f64, String)>;
+
+thread_local! {
+    static WORST: RefCell<Worst> = RefCell::default();
+}
+
+impl Promise {
+    /// A promise of a section of the table.
+    pub const fn new(section: &'static str, text: &'static str) -> Self {
+        Self { section, text, unit: None, aim: None }
+    }
+
+    /// Bounds are multiples of `size`, called `name` in the table.
+    pub const fn in_units(mut self, name: &'static str, size: f64) -> Self {
+        self.unit = Some((name, size));
+        self
+    }
+
+    /// What was aimed for and is not reached, and why: the verdict is "short" until it is.
+    pub const fn short_of(mut self, aim: f64, reason: &'static str) -> Self {
+        self.aim = Some((aim, reason));
+        self
+    }
+
+    /// measured <= bound.
+    #[track_caller]
+    pub fn at_most(self, bound: f64, measured: f64) {
+        let size = self.size();
+        let short = self.aim.is_some_and(|(aim, _)| !(measured <= aim * size));
+        self.record(format!("<= {}", number(bound)), measured / size, measured / size, measured <= bound * size, short);
+    }
+
+    /// measured >= bound.
+    #[track_caller]
+    pub fn at_least(self, bound: f64, measured: f64) {
+        let size = self.size();
+        let short = self.aim.is_some_and(|(aim, _)| !(measured >= aim * size));
+        self.record(
+            format!(">= {}", number(bound)),
+            -measured / size,
+            measured / size,
+            measured >= bound * size,
+            short,
+        );
+    }
+
+    /// low <= measured <= high; an aim has no meaning here.
+    #[track_caller]
+    pub fn within(self, low: f64, high: f64, measured: f64) {
+        let size = self.size();
+        let off = (measured / size - 0.5 * (low + high)).abs();
+        let held = low * size <= measured && measured <= high * size;
+        self.record(format!("{} to {}", number(low), number(high)), off, measured / size, held, false);
+    }
+
+    /// Both are the same.
+    #[track_caller]
+    pub fn equal<T: PartialEq + Debug + ?Sized>(self, left: &T, right: &T) {
+        self.line("equal".into(), 0.0, if left == right { "equal" } else { "differs" }.into(), left == right, false);
+        assert!(left == right, "{}: {}\n left: {left:?}\nright: {right:?}", self.section, self.text);
+    }
+
+    /// It is so.
+    #[track_caller]
+    pub fn holds(self, held: bool) {
+        self.line("always".into(), 0.0, if held { "always" } else { "not always" }.into(), held, false);
+        assert!(held, "{}: {}", self.section, self.text);
+    }
+
+    fn size(&self) -> f64 {
+        self.unit.map_or(1.0, |(_, size)| size)
+    }
+
+    #[track_caller]
+    fn record(self, mut bound: String, badness: f64, measured: f64, held: bool, short: bool) {
+        if let Some((name, _)) = self.unit {
+            bound = format!("{bound} {name}");
+        }
+        if let Some((aim, _)) = self.aim {
+            bound = format!("{bound}, aim {}", number(aim));
+        }
+        // Nothing in units of nothing is nothing.
+        let [badness, measured] = [badness, measured].map(|x| if held && x.is_nan() { 0.0 } else { x });
+        self.line(bound.clone(), badness, format!("{measured:.1e}"), held, short);
+        assert!(held, "{}: {}: {measured:e} is not {bound}", self.section, self.text);
+    }
+
+    /// Writes a line if it is the first or the worst of its promise in this test.
+    fn line(&self, bound: String, badness: f64, measured: String, held: bool, short: bool) {
+        let Some((folder, test)) = folder().zip(test()) else { return };
+        let badness = if held { badness } else { f64::INFINITY };
+        let worst = WORST.with_borrow_mut(|worst| {
+            let (known, stated) = worst.entry((self.section, self.text)).or_insert((f64::NEG_INFINITY, bound.clone()));
+            assert_eq!(*stated, bound, "two bounds of one promise, {}: {}", self.section, self.text);
+            let worse = badness > *known || badness == f64::INFINITY;
+            *known = known.max(badness);
+            worse
+        });
+        if !worst {
+            return;
+        }
+        let verdict = match self.aim {
+            _ if !held => "broken".into(),
+            Some((_, reason)) if short => format!("short: {reason}"),
+            _ => "held".into(),
+        };
+        let line = Line {
+            section: self.section.into(),
+            promise: self.text.into(),
+            bound,
+            measured,
+            verdict,
+            test: format!("{}::{test}", binary()),
+        };
+        append(folder, &line);
+    }
+}
+
+/// A number without loss, short where it can be.
+fn number(x: f64) -> String {
+    if x == 0.0 || (1e-3..1e5).contains(&x.abs()) { format!("{x}") } else { format!("{x:e}") }
+}
+
+fn folder() -> Option<&'static PathBuf> {
+    static FOLDER: OnceLock<Option<PathBuf>> = OnceLock::new();
+    FOLDER.get_or_init(|| env::var_os("PAROPS_PROMISES").map(PathBuf::from)).as_ref()
+}
+
+/// The path of the test this thread runs, if it runs one.
+fn test() -> Option<String> {
+    let path = |name: &str| name.chars().all(|c| c.is_alphanumeric() || c == '_' || c == ':');
+    thread::current().name().filter(|&name| name != "main" && path(name)).map(Into::into)
+}
+
+/// The name of the test binary, without the hash behind it.
+fn binary() -> String {
+    let path = env::current_exe().expect("a running program has a path");
+    let name = path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    name.rsplit_once('-').map_or(name.clone(), |(name, _)| name.into())
+}
+
+fn append(folder: &PathBuf, line: &Line) {
+    static WRITING: Mutex<()> = Mutex::new(());
+    let _alone = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
+    let written = create_dir_all(folder)
+        .and_then(|()| OpenOptions::new().create(true).append(true).open(folder.join(format!("{}.tsv", binary()))))
+        .and_then(|mut file| file.write_all(format!("{}\n", line.to_tsv()).as_bytes()));
+    written.unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+}
