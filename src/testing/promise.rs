@@ -1,7 +1,7 @@
 //! Promises with their bounds, asserted where they are measured and recorded for a table.
 
+use std::borrow::Cow;
 use std::cell::RefCell;
-use std::collections::HashMap;
 use std::fmt::Debug;
 use std::fs::{OpenOptions, create_dir_all};
 use std::io::Write;
@@ -26,43 +26,48 @@ use super::verification::Line;
 ///
 /// # Panics
 /// Every verb panics where its promise is broken, and where one test states a promise with two bounds.
-#[derive(Clone, Copy, Debug)]
-#[must_use = "a promise is checked by its last verb"]
+#[derive(Clone, Debug)]
+#[must_use = "a promise is checked by a bound"]
 pub struct Promise {
     section: &'static str,
-    text: &'static str,
+    text: Cow<'static, str>,
     unit: Option<(&'static str, f64)>,
     aim: Option<(f64, &'static str)>,
 }
 
-/// How bad the worst of a line was, and its bound.
-type Worst = HashMap<(&'static str, &'static str), (f64, String)>;
+/// The worst of a promise so far, and its bound.
+struct Worst {
+    section: &'static str,
+    text: Cow<'static, str>,
+    bound: String,
+    badness: f64,
+}
 
 thread_local! {
-    static WORST: RefCell<Worst> = RefCell::default();
+    static WORST: RefCell<Vec<Worst>> = const { RefCell::new(Vec::new()) };
 }
 
 impl Promise {
     /// A promise of a section of the table.
-    pub const fn new(section: &'static str, text: &'static str) -> Self {
-        Self { section, text, unit: None, aim: None }
+    pub fn new(section: &'static str, text: impl Into<Cow<'static, str>>) -> Self {
+        Self { section, text: text.into(), unit: None, aim: None }
     }
 
     /// Bounds are multiples of `size`, called `name` in the table.
-    pub const fn in_units(mut self, name: &'static str, size: f64) -> Self {
+    pub fn in_units(mut self, name: &'static str, size: f64) -> Self {
         self.unit = Some((name, size));
         self
     }
 
     /// What was aimed for and is not reached, and why: the verdict is "short" until it is.
-    pub const fn short_of(mut self, aim: f64, reason: &'static str) -> Self {
+    pub fn short_of(mut self, aim: f64, reason: &'static str) -> Self {
         self.aim = Some((aim, reason));
         self
     }
 
     /// measured <= bound.
     #[track_caller]
-    pub fn at_most(self, bound: f64, measured: f64) {
+    pub fn at_most(&self, bound: f64, measured: f64) {
         let size = self.size();
         let short = self.aim.is_some_and(|(aim, _)| !(measured <= aim * size));
         self.record(format!("<= {}", number(bound)), measured / size, measured / size, measured <= bound * size, short);
@@ -70,7 +75,7 @@ impl Promise {
 
     /// measured >= bound.
     #[track_caller]
-    pub fn at_least(self, bound: f64, measured: f64) {
+    pub fn at_least(&self, bound: f64, measured: f64) {
         let size = self.size();
         let short = self.aim.is_some_and(|(aim, _)| !(measured >= aim * size));
         self.record(
@@ -84,7 +89,7 @@ impl Promise {
 
     /// low <= measured <= high; an aim has no meaning here.
     #[track_caller]
-    pub fn within(self, low: f64, high: f64, measured: f64) {
+    pub fn within(&self, low: f64, high: f64, measured: f64) {
         let size = self.size();
         let off = (measured / size - 0.5 * (low + high)).abs();
         let held = low * size <= measured && measured <= high * size;
@@ -93,14 +98,14 @@ impl Promise {
 
     /// Both are the same.
     #[track_caller]
-    pub fn equal<T: PartialEq + Debug + ?Sized>(self, left: &T, right: &T) {
+    pub fn equal<T: PartialEq + Debug + ?Sized>(&self, left: &T, right: &T) {
         self.line("equal".into(), 0.0, if left == right { "equal" } else { "differs" }.into(), left == right, false);
         assert!(left == right, "{}: {}\n left: {left:?}\nright: {right:?}", self.section, self.text);
     }
 
     /// It is so.
     #[track_caller]
-    pub fn holds(self, held: bool) {
+    pub fn holds(&self, held: bool) {
         self.line("always".into(), 0.0, if held { "always" } else { "not always" }.into(), held, false);
         assert!(held, "{}: {}", self.section, self.text);
     }
@@ -110,7 +115,7 @@ impl Promise {
     }
 
     #[track_caller]
-    fn record(self, mut bound: String, badness: f64, measured: f64, held: bool, short: bool) {
+    fn record(&self, mut bound: String, badness: f64, measured: f64, held: bool, short: bool) {
         if let Some((name, _)) = self.unit {
             bound = format!("{bound} {name}");
         }
@@ -127,14 +132,7 @@ impl Promise {
     fn line(&self, bound: String, badness: f64, measured: String, held: bool, short: bool) {
         let Some((folder, test)) = folder().zip(test()) else { return };
         let badness = if held { badness } else { f64::INFINITY };
-        let worst = WORST.with_borrow_mut(|worst| {
-            let (known, stated) = worst.entry((self.section, self.text)).or_insert((f64::NEG_INFINITY, bound.clone()));
-            assert_eq!(*stated, bound, "two bounds of one promise, {}: {}", self.section, self.text);
-            let worse = badness > *known || badness == f64::INFINITY;
-            *known = known.max(badness);
-            worse
-        });
-        if !worst {
+        if !self.is_worst(&bound, badness) {
             return;
         }
         let verdict = match self.aim {
@@ -144,7 +142,7 @@ impl Promise {
         };
         let line = Line {
             section: self.section.into(),
-            promise: self.text.into(),
+            promise: self.text.to_string(),
             bound,
             measured,
             verdict,
@@ -152,9 +150,25 @@ impl Promise {
         };
         append(folder, &line);
     }
+
+    /// Whether nothing as bad was seen in this test.
+    fn is_worst(&self, bound: &str, badness: f64) -> bool {
+        WORST.with_borrow_mut(|all| {
+            let mine = |worst: &&mut Worst| worst.section == self.section && worst.text == self.text;
+            let Some(worst) = all.iter_mut().find(mine) else {
+                let (section, text, bound) = (self.section, self.text.clone(), bound.into());
+                all.push(Worst { section, text, bound, badness });
+                return true;
+            };
+            assert_eq!(worst.bound, bound, "two bounds of one promise, {}: {}", self.section, self.text);
+            let worse = badness > worst.badness || badness == f64::INFINITY;
+            worst.badness = worst.badness.max(badness);
+            worse
+        })
+    }
 }
 
-/// A number without loss, short where it can be.
+/// A number without loss, and short where it can be.
 fn number(x: f64) -> String {
     if x == 0.0 || (1e-3..1e5).contains(&x.abs()) { format!("{x}") } else { format!("{x:e}") }
 }
@@ -166,8 +180,12 @@ fn folder() -> Option<&'static PathBuf> {
 
 /// The path of the test this thread runs, if it runs one.
 fn test() -> Option<String> {
-    let path = |name: &str| name.chars().all(|c| c.is_alphanumeric() || c == '_' || c == ':');
-    thread::current().name().filter(|&name| name != "main" && path(name)).map(Into::into)
+    thread::current().name().filter(|&name| name != "main" && is_path(name)).map(Into::into)
+}
+
+/// Names of tests are paths; those of doctests are not.
+fn is_path(name: &str) -> bool {
+    name.chars().all(|c| c.is_alphanumeric() || c == '_' || c == ':')
 }
 
 /// The name of the test binary, without the hash behind it.

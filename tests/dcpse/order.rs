@@ -4,7 +4,7 @@
 
 use crate::measure::{OfDegree, Series, observe};
 use crate::sets::Set;
-use parops::{Field, Laplacian, Operator};
+use parops::{Field, Laplacian, Operator, testing::Promise};
 
 /// Four grids, from coarse to fine.
 fn sides<const D: usize>() -> Vec<usize> {
@@ -21,6 +21,15 @@ fn holds<const D: usize, const K: usize, T: Field>(
         let Series { set, order, even, .. } = series;
         let name = format!("{D}D l {} output {k} r {order} {} even {even}", outcome.conditions, set.name());
         println!("{name}: {observed:.3?}, {} of {} rows grown", outcome.grown, outcome.rows);
+        for band in crate::bands::bands(series, D, observed).into_iter().take(3) {
+            let promise = Promise::new("Orders", format!("DC-PSE {D}D, r = {order}, {} order", band.what));
+            match (band.low.is_finite(), band.high.is_finite()) {
+                (true, true) => promise.within(band.low, band.high, band.value),
+                (true, false) => promise.at_least(band.low, band.value),
+                (false, true) => promise.at_most(band.high, band.value),
+                _ => {}
+            }
+        }
         assert!(left.is_empty(), "{name}: {left:?}, {observed:?}");
     }
 }
