@@ -69,22 +69,18 @@ impl Promise {
     #[track_caller]
     pub fn at_most(&self, bound: f64, measured: f64) {
         let size = self.size();
-        let short = self.aim.is_some_and(|(aim, _)| !(measured <= aim * size));
-        self.record(format!("<= {}", number(bound)), measured / size, measured / size, measured <= bound * size, short);
+        let missed = self.aim.is_some_and(|(aim, _)| !(measured <= aim * size));
+        let bound_text = || format!("<= {}", number(bound));
+        self.record(bound_text, measured / size, measured / size, measured <= bound * size, missed);
     }
 
     /// measured >= bound.
     #[track_caller]
     pub fn at_least(&self, bound: f64, measured: f64) {
         let size = self.size();
-        let short = self.aim.is_some_and(|(aim, _)| !(measured >= aim * size));
-        self.record(
-            format!(">= {}", number(bound)),
-            -measured / size,
-            measured / size,
-            measured >= bound * size,
-            short,
-        );
+        let missed = self.aim.is_some_and(|(aim, _)| !(measured >= aim * size));
+        let bound_text = || format!(">= {}", number(bound));
+        self.record(bound_text, -measured / size, measured / size, measured >= bound * size, missed);
     }
 
     /// low <= measured <= high; an aim has no meaning here.
@@ -93,20 +89,22 @@ impl Promise {
         let size = self.size();
         let off = (measured / size - 0.5 * (low + high)).abs();
         let held = low * size <= measured && measured <= high * size;
-        self.record(format!("{} to {}", number(low), number(high)), off, measured / size, held, false);
+        let bound_text = || format!("{} to {}", number(low), number(high));
+        self.record(bound_text, off, measured / size, held, false);
     }
 
     /// Both are the same.
     #[track_caller]
     pub fn equal<T: PartialEq + Debug + ?Sized>(&self, left: &T, right: &T) {
-        self.line("equal".into(), 0.0, if left == right { "equal" } else { "differs" }.into(), left == right, false);
-        assert!(left == right, "{}: {}\n left: {left:?}\nright: {right:?}", self.section, self.text);
+        let held = left == right;
+        self.line(|| "equal".into(), 0.0, || if held { "equal" } else { "differs" }.into(), held, false);
+        assert!(held, "{}: {}\n left: {left:?}\nright: {right:?}", self.section, self.text);
     }
 
     /// It is so.
     #[track_caller]
     pub fn holds(&self, held: bool) {
-        self.line("always".into(), 0.0, if held { "always" } else { "not always" }.into(), held, false);
+        self.line(|| "always".into(), 0.0, || if held { "always" } else { "not always" }.into(), held, false);
         assert!(held, "{}: {}", self.section, self.text);
     }
 
@@ -115,36 +113,36 @@ impl Promise {
     }
 
     #[track_caller]
-    fn record(&self, mut bound: String, badness: f64, measured: f64, held: bool, short: bool) {
-        if let Some((name, _)) = self.unit {
-            bound = format!("{bound} {name}");
-        }
-        if let Some((aim, _)) = self.aim {
-            bound = format!("{bound}, aim {}", number(aim));
-        }
+    fn record(&self, bound: impl Fn() -> String, badness: f64, measured: f64, held: bool, missed: bool) {
+        let bound = || {
+            let unit = self.unit.map(|(name, _)| format!(" {name}")).unwrap_or_default();
+            let aim = self.aim.map(|(aim, _)| format!(", aim {}", number(aim))).unwrap_or_default();
+            format!("{}{unit}{aim}", bound())
+        };
         // Nothing in units of nothing is nothing.
         let [badness, measured] = [badness, measured].map(|x| if held && x.is_nan() { 0.0 } else { x });
-        self.line(bound.clone(), badness, format!("{measured:.1e}"), held, short);
-        assert!(held, "{}: {}: {measured:e} is not {bound}", self.section, self.text);
+        self.line(bound, badness, || format!("{measured:.1e}"), held, missed);
+        assert!(held, "{}: {}: {measured:e} is not {}", self.section, self.text, bound());
     }
 
     /// Writes a line if it is the first or the worst of its promise in this test.
-    fn line(&self, bound: String, badness: f64, measured: String, held: bool, short: bool) {
-        let Some((folder, test)) = folder().zip(test()) else { return };
-        let badness = if held { badness } else { f64::INFINITY };
-        if !self.is_worst(&bound, badness) {
+    fn line(&self, bound: impl Fn() -> String, badness: f64, measured: impl Fn() -> String, held: bool, missed: bool) {
+        let Some(folder) = folder() else { return };
+        let bound = bound();
+        if !self.is_worst(&bound, if held { badness } else { f64::INFINITY }) {
             return;
         }
+        let Some(test) = test() else { return };
         let verdict = match self.aim {
             _ if !held => "broken".into(),
-            Some((_, reason)) if short => format!("short: {reason}"),
+            Some((_, reason)) if missed => format!("short: {reason}"),
             _ => "held".into(),
         };
         let line = Line {
             section: self.section.into(),
             promise: self.text.to_string(),
             bound,
-            measured,
+            measured: measured(),
             verdict,
             test: format!("{}::{test}", binary()),
         };

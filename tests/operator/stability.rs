@@ -442,7 +442,7 @@ fn advection_limits_of_central_pse_follow_from_the_imaginary_intervals() {
     let (rk4, leapfrog, euler) = (Rk4::<f64>::new(), Leapfrog::<f64>::new(), Euler::<f64>::new());
     let entries = bounds["advection_central"].as_object().unwrap();
     assert_eq!(entries.len(), 12);
-    for (name, entry) in entries {
+    for entry in entries.values() {
         let number = |key: &str| entry[key].as_f64().unwrap();
         for (stepper, key) in [(&rk4 as &dyn Stepper<f64>, "rk4"), (&leapfrog, "leapfrog"), (&euler, "explicit_euler")]
         {
