@@ -9,7 +9,7 @@ use parops::{
 /// Separations z of a stencil of `count` points in units of epsilon: a lattice of spacing h around the target, each
 /// point moved by up to `jitter` h, only points with as many leading coordinates >= 0 as `cut` says kept (half,
 /// quarter, eighth stencils), the nearest first.
-fn stencil<const D: usize>(count: usize, jitter: f64, cut: usize, seed: u64) -> Vec<[f64; D]> {
+pub fn stencil<const D: usize>(count: usize, jitter: f64, cut: usize, seed: u64) -> Vec<[f64; D]> {
     let mut random = Random::new(seed);
     let mut points = Vec::new();
     // Far enough for twice the conditions of order 4 in an eighth of space.
@@ -39,7 +39,7 @@ fn one<const D: usize>(beta: MultiIndex<D>) -> Vec<Vec<Term<D>>> {
 }
 
 /// Weights of one operator on one stencil by a solver; the system, the weights, and what the solver says.
-fn solve<const D: usize>(
+pub fn solve<const D: usize>(
     solver: &impl MomentSolver,
     beta: MultiIndex<D>,
     order: u32,

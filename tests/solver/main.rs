@@ -13,6 +13,7 @@ mod hyperviscosity;
 mod jump;
 mod lagrangian;
 mod lagrangian_growth;
+mod relations;
 mod remeshed;
 mod resume;
 mod scene;
