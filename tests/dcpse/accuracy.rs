@@ -79,14 +79,14 @@ fn exp_of_minus(x: Twice) -> Twice {
 fn eliminate(mut a: Vec<Vec<Twice>>, mut b: Vec<Twice>) -> Vec<Twice> {
     let l = b.len();
     for k in 0..l {
-        let pivot = (k..l).max_by(|&i, &j| a[i][k].0.abs().total_cmp(&a[j][k].0.abs())).unwrap();
-        a.swap(k, pivot);
-        b.swap(k, pivot);
-        for i in k + 1..l {
-            let factor = a[i][k] / a[k][k];
-            for j in k..l {
-                a[i][j] = a[i][j] - factor * a[k][j];
-            }
+        let largest = (k..l).max_by(|&i, &j| a[i][k].0.abs().total_cmp(&a[j][k].0.abs())).unwrap();
+        a.swap(k, largest);
+        b.swap(k, largest);
+        let (known, below) = a.split_at_mut(k + 1);
+        let pivot = &known[k][k..];
+        for (row, i) in below.iter_mut().zip(k + 1..) {
+            let factor = row[k] / pivot[0];
+            row[k..].iter_mut().zip(pivot).for_each(|(x, &p)| *x = *x - factor * p);
             b[i] = b[i] - factor * b[k];
         }
     }
