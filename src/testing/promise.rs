@@ -121,7 +121,7 @@ impl Promise {
         };
         // Nothing in units of nothing is nothing.
         let [badness, measured] = [badness, measured].map(|x| if held && x.is_nan() { 0.0 } else { x });
-        self.line(bound, badness, || format!("{measured:.1e}"), held, missed);
+        self.line(bound, badness, || two_digits(measured), held, missed);
         assert!(held, "{}: {}: {measured:e} is not {}", self.section, self.text, bound());
     }
 
@@ -169,6 +169,15 @@ impl Promise {
 /// A number without loss, and short where it can be.
 fn number(x: f64) -> String {
     if x == 0.0 || (1e-3..1e5).contains(&x.abs()) { format!("{x}") } else { format!("{x:e}") }
+}
+
+fn two_digits(x: f64) -> String {
+    let places = 1.0 - x.abs().log10().floor();
+    match places {
+        _ if x == 0.0 => "0".into(),
+        -1.0..=4.0 => format!("{x:.*}", places.max(0.0) as usize),
+        _ => format!("{x:.1e}"),
+    }
 }
 
 fn folder() -> Option<&'static PathBuf> {

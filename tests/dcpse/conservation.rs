@@ -47,7 +47,7 @@ fn heat_by_dcpse_changes_its_mass_by_percents_per_unit_time_and_by_pse_by_round_
             }
             let typical = f64::sqrt(squares);
             println!("r = {r}, {n} x {n}: {:.2} % per unit time; PSE {largest_of_pse:.1e} eps sum|w|", 100.0 * typical);
-            let drifts = Promise::new("Conservation", "DC-PSE heat loses or gains mass, share per unit time");
+            let drifts = Promise::new("Conservation", "DC-PSE heat changes its mass, share per unit time");
             drifts.at_least(1e-3, typical);
             let keeps = Promise::new("Conservation", "PSE heat on the same sets, mass rate");
             keeps.in_units("eps sum w", 1.0).at_most(1.0, largest_of_pse);

@@ -23,7 +23,8 @@ fn laplacian_of_a_polynomial_is_exact_on_a_scattered_set_to_its_edges() -> Failu
             .at_most(1e-8, (out - exact).abs());
     }
     let report = rows.report();
-    Promise::new("Residuals", "reported residual of that Laplacian").at_most(1e-12, report.residual);
+    Promise::new("Residuals", "Laplacian of r = 4 of a polynomial of degree 5, residual reported")
+        .at_most(1e-12, report.residual);
     assert!(report.condition < 1e7, "{report:?}");
     assert_eq!(report.rungs.iter().sum::<usize>(), 196);
     Ok(())

@@ -353,12 +353,18 @@ fn growth_of_plain_rows(n: usize, order: u32, ratio: f64, seed: u64) -> f64 {
 #[test]
 fn insulated_walls_of_order_four_grow_with_two_neighbors_per_condition_but_not_with_three() {
     let growing = |ratio| (0..60).filter(|&seed| growth_of_plain_rows(12, 4, ratio, seed) > NEUTRAL).count();
-    assert!(growing(2.0) > 0);
-    assert_eq!(growing(3.0), 0);
+    let of_sixty = |text| Promise::new("Limits of steps", text);
+    let reason = "two neighbors a condition are too few where the wall value hardly counts: such rows are widened";
+    let plain = of_sixty("plain rows of insulated walls, r = 4, 2 neighbors a condition: sets of 60 that grow");
+    let with_two = growing(2.0);
+    plain.short_of(0.0, reason).at_most(30.0, with_two as f64);
+    assert!(with_two > 0);
+    of_sixty("plain rows of insulated walls, r = 4, 3 neighbors a condition: sets of 60 that grow")
+        .at_most(0.0, growing(3.0) as f64);
     // Widened where the wall value hardly counts, both are stable.
     for ratio in [2.0, 3.0] {
         let growing = (0..60).filter(|&seed| Insulated::<2>::new(12, 4, ratio, seed).growth() > NEUTRAL).count();
-        assert_eq!(growing, 0, "{ratio}");
+        of_sixty("widened rows of insulated walls, r = 4: sets of 60 that grow").at_most(0.0, growing as f64);
     }
 }
 
