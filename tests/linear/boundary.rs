@@ -6,6 +6,7 @@ use parops::{
     Apply, ApplyError, BoundaryCondition, BoundaryError, BoundaryRows, CellList, Contraction, CsrMatrix, Cutoff, DcPse,
     Domain, ErrorKind, Face, Fallback, Gradient, Laplacian, LinearError, MultiIndex, MultiIndexError, Nearest,
     OperatorError, Particles, Plan, Random, Rk4, Rows, Sign, SparseSolver, StepLimit, graded, integrate,
+    testing::Promise,
 };
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
@@ -147,7 +148,8 @@ fn returns_polynomials<const D: usize>(n: usize, orders: std::ops::RangeInclusiv
     TestRunner::new(config)
         .run(&(orders, any::<u64>()), |(order, seed)| {
             let (miss, condition) = miss::<D>(n, order, seed);
-            prop_assert!(miss <= EXACT, "r {order}: {miss:e}, condition {condition:e}");
+            let _ = condition;
+            Promise::new("Residuals", format!("boundary values of polynomials in {D}D")).at_most(EXACT, miss);
             Ok(())
         })
         .unwrap();
@@ -351,12 +353,18 @@ fn growth_of_plain_rows(n: usize, order: u32, ratio: f64, seed: u64) -> f64 {
 #[test]
 fn insulated_walls_of_order_four_grow_with_two_neighbors_per_condition_but_not_with_three() {
     let growing = |ratio| (0..60).filter(|&seed| growth_of_plain_rows(12, 4, ratio, seed) > NEUTRAL).count();
-    assert!(growing(2.0) > 0);
-    assert_eq!(growing(3.0), 0);
+    let of_sixty = |text| Promise::new("Limits of steps", text);
+    let reason = "two neighbors a condition are too few where the wall value hardly counts: such rows are widened";
+    let plain = of_sixty("plain rows of insulated walls, r = 4, 2 neighbors a condition: sets of 60 that grow");
+    let with_two = growing(2.0);
+    plain.short_of(0.0, reason).at_most(30.0, with_two as f64);
+    assert!(with_two > 0);
+    of_sixty("plain rows of insulated walls, r = 4, 3 neighbors a condition: sets of 60 that grow")
+        .at_most(0.0, growing(3.0) as f64);
     // Widened where the wall value hardly counts, both are stable.
     for ratio in [2.0, 3.0] {
         let growing = (0..60).filter(|&seed| Insulated::<2>::new(12, 4, ratio, seed).growth() > NEUTRAL).count();
-        assert_eq!(growing, 0, "{ratio}");
+        of_sixty("widened rows of insulated walls, r = 4: sets of 60 that grow").at_most(0.0, growing as f64);
     }
 }
 
@@ -431,7 +439,8 @@ fn heat_between_insulated_walls_converges_with_the_order_of_its_rows() {
         let errors = sides.map(|n| heat_error(n, order, 4));
         let observed = (errors[0] / errors[2]).ln() / (sides[2] as f64 / sides[0] as f64).ln();
         let low = f64::from(order) - 0.3;
-        assert!((low..high).contains(&observed) && errors[1] < errors[0], "r {order}: {observed}, {errors:?}");
+        assert!(errors[1] < errors[0], "r {order}: {errors:?}");
+        Promise::new("Orders", format!("heat between insulated walls, r = {order}")).within(low, high, observed);
     }
 }
 
