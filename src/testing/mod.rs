@@ -2,6 +2,7 @@
 //!
 //! Each returns the first promise that is broken, with the numbers.
 
+mod fuzz;
 mod kernel;
 mod mesh_kernel;
 mod method;
@@ -12,6 +13,7 @@ mod smoothing;
 mod stepper;
 mod stepper_fault;
 
+pub use fuzz::{FuzzFault, FuzzOutcome, fuzz_neighbor_build, fuzz_operator_build};
 pub use kernel::{KernelFault, KernelLimits, check_kernel};
 pub use mesh_kernel::{MeshKernelFault, check_mesh_kernel};
 pub use method::{check_method, check_method_moments};
