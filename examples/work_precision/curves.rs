@@ -14,7 +14,7 @@ const BLACK: usize = 4;
 /// A task of more series than this is drawn stepper by stepper.
 const CROWD: usize = 12;
 
-/// Draws all samples of a scene: methods by marks, orders and steppers by colors.
+/// Draws all samples of a scene: methods by marks, orders and steppers by colors; of one method alone the steppers by marks.
 pub fn draw(path: &Path, table: &Table, scene: &str) -> Result<(), Box<dyn Error>> {
     let mut tasks: Vec<Task> = table.tasks().into_iter().filter(|task| task.samples()[0].scene == scene).collect();
     tasks.sort_by_key(|task| task.samples()[0].dim);
@@ -24,13 +24,15 @@ pub fn draw(path: &Path, table: &Table, scene: &str) -> Result<(), Box<dyn Error
     let crowded = steppers.len() > 1 && tasks.iter().any(|task| task.series().len() > CROWD);
     // More methods than marks are told apart by colors too.
     let many = methods.len() > MARKS.len();
+    let alone = methods.len() == 1;
     let kind = |sample: &Sample| {
         let Sample { method, order, stepper, scalar, .. } = sample;
         let order = if many { format!("{method} {order}") } else { order.to_string() };
-        if crowded { format!("{order} {scalar}") } else { format!("{order} {stepper} {scalar}") }
+        if crowded || alone { format!("{order} {scalar}") } else { format!("{order} {stepper} {scalar}") }
     };
     let kinds = distinct(of_scene().map(kind));
     let place = |names: &[String], name: &str| names.iter().position(|other| other == name).unwrap_or(0);
+    let marked = |s: &Sample| if alone { place(&steppers, &s.stepper) } else { place(&methods, &s.method) };
     let curve = |series: &Vec<&Sample>| {
         let color = place(&kinds, &kind(series[0]));
         let whole = series[0].label();
@@ -38,7 +40,7 @@ pub fn draw(path: &Path, table: &Table, scene: &str) -> Result<(), Box<dyn Error
         Curve {
             name: if crowded { without() } else { whole },
             points: series.iter().filter_map(|sample| point(sample)).collect(),
-            mark: MARKS[place(&methods, &series[0].method) % MARKS.len()],
+            mark: MARKS[marked(series[0]) % MARKS.len()],
             color: color + usize::from(color >= BLACK),
         }
     };
@@ -58,9 +60,14 @@ pub fn draw(path: &Path, table: &Table, scene: &str) -> Result<(), Box<dyn Error
         }
     }
     let axes = |title| Axes { title, x: "seconds", y: "L2 error", logarithmic: true };
-    let columns = if crowded { groups.len() } else { distinct(of_scene().map(|sample| sample.set.clone())).len() };
+    let sets = distinct(of_scene().map(|sample| sample.set.clone())).len();
     let titles: Vec<String> = panels.iter().map(|(title, _)| title.clone()).collect();
     let panels = panels.into_iter().zip(&titles).map(|((_, curves), title)| (axes(title), curves)).collect();
+    let columns = match (crowded, sets) {
+        (true, _) => groups.len(),
+        (false, 1) => titles.len(),
+        (false, sets) => sets,
+    };
     grid::draw(path, columns.min(titles.len()), panels)
 }
 

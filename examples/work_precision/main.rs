@@ -7,11 +7,13 @@
 //!
 //! `cargo run --release --features faer --example work_precision [-- --quick] [-- --scene NAME] [-- --out DIR]`
 
+mod advection_diffusion;
 mod bench;
 #[allow(dead_code, reason = "the record is that of the example lecture_diffusion")]
 #[path = "../lecture_diffusion/benchmark.rs"]
 mod benchmark;
 mod bounds;
+mod cells;
 mod choice;
 mod counting;
 mod curves;
@@ -23,11 +25,15 @@ mod finite_difference;
 #[path = "../figure/grid.rs"]
 mod grid;
 mod lecture;
+#[path = "../poisson/field.rs"]
+mod manufactured;
 mod operators;
 mod overlap;
+mod poisson;
 #[path = "../lecture_diffusion/random_walk.rs"]
 mod random_walk;
 mod remeshing;
+mod round;
 #[allow(dead_code, reason = "records are those of the example stiff_diffusion")]
 #[path = "../stiff_diffusion/scheme.rs"]
 mod scheme;
@@ -53,6 +59,8 @@ const SCENES: &[(&str, Scene)] = &[
     ("derivatives", derivatives::run),
     ("lecture", lecture::run),
     ("overlap", overlap::run),
+    ("poisson", poisson::run),
+    ("advection_diffusion", advection_diffusion::run),
     ("stiff", stiff::run),
     ("remeshing", remeshing::run),
 ];

@@ -13,8 +13,8 @@ use crate::scheme::{EXPLICIT, STIFF, Scheme};
 use crate::setting::{END, Physics, Setting, lattice, scattered};
 
 const SCENE: &str = "stiff";
-/// Particles along an axis, in quick runs too: the exponential takes their sixth power.
-const SIDE: usize = 16;
+/// Particles along an axis in quick and in full runs: the exponential takes their sixth power.
+const SIDES: [usize; 2] = [16, 24];
 /// Relative errors below this are rounding.
 const ROUNDING: f64 = 1e-10;
 /// How far an order in time may be from that of its scheme.
@@ -23,8 +23,9 @@ const BAND: f64 = 0.3;
 const GOOD: f64 = 1e-3;
 
 pub fn run(bench: &mut Bench) -> Result<(), Box<dyn Error>> {
-    each(bench, "PSE", SIDE, &lattice(SIDE)?)?;
-    each(bench, "DC-PSE", SIDE, &scattered(SIDE)?)?;
+    let side = SIDES[usize::from(!bench.quick)];
+    each(bench, "PSE", side, &lattice(side)?)?;
+    each(bench, "DC-PSE", side, &scattered(side)?)?;
     claims(bench);
     Ok(())
 }
@@ -36,7 +37,7 @@ fn each<M: Method<2, Out = [f64; 1]> + Clone>(
     setting: &Setting<M>,
 ) -> parops::Result<()> {
     for scheme in EXPLICIT.into_iter().chain(STIFF) {
-        for steps in steps(setting, scheme) {
+        for steps in steps(setting, scheme, bench.quick) {
             let dt = END / steps as f64;
             let what = Sample {
                 stepper: scheme.name().replace(", ", " by "),
@@ -62,12 +63,12 @@ fn each<M: Method<2, Out = [f64; 1]> + Clone>(
 }
 
 /// Explicit schemes from their limit on, the others from steps that are as long as they like.
-fn steps<M: Method<2, Out = [f64; 1]> + Clone>(setting: &Setting<M>, scheme: Scheme) -> Vec<u64> {
+fn steps<M: Method<2, Out = [f64; 1]> + Clone>(setting: &Setting<M>, scheme: Scheme, quick: bool) -> Vec<u64> {
     if EXPLICIT.contains(&scheme) {
         let fewest = (END / setting.limit(scheme)).ceil() as u64;
-        return (0..2).map(|doublings| fewest << doublings).collect();
+        return (0..if quick { 2 } else { 3 }).map(|doublings| fewest << doublings).collect();
     }
-    (2..8).map(|doublings| 1 << doublings).collect()
+    (2..if quick { 8 } else { 10 }).map(|doublings| 1 << doublings).collect()
 }
 
 /// The field at the end, and its neighbors in the mean.

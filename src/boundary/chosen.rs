@@ -1,5 +1,6 @@
 //! The boundary particles as targets of their own, each with the cutoff that holds the nearest particles it needs.
 
+use crate::domain::Domain;
 use crate::error::Result;
 use crate::neighbors::Neighbors;
 use crate::particles::reserved;
@@ -69,6 +70,10 @@ impl<const D: usize, P: Neighbors<D>> Neighbors<D> for Chosen<'_, P> {
 
     fn generation(&self) -> u64 {
         self.all.generation()
+    }
+
+    fn domain(&self) -> Option<&Domain<D>> {
+        self.all.domain()
     }
 
     fn for_each(&self, i: usize, cutoff: f64, visit: impl FnMut(Neighbor<D>)) {

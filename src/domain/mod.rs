@@ -125,6 +125,19 @@ impl<const D: usize> Domain<D> {
         self.faces
     }
 
+    /// The places of the mirrors of an axis.
+    pub(crate) fn mirrors(&self, axis: usize) -> impl Iterator<Item = f64> {
+        let [lower, upper] = self.faces[axis];
+        let places = [(lower, self.lower[axis]), (upper, self.upper[axis])];
+        places.into_iter().filter_map(|(face, place)| face.is_mirror().then_some(place))
+    }
+
+    /// The same box with open faces in the place of mirrors.
+    pub(crate) fn without_mirrors(&self) -> Self {
+        let open = |face: Face| if face.is_mirror() { Face::Open } else { face };
+        Self { faces: self.faces.map(|faces| faces.map(open)), ..*self }
+    }
+
     /// The widths w_i = upper_i - lower_i.
     pub fn widths(&self) -> [f64; D] {
         std::array::from_fn(|axis| self.upper[axis] - self.lower[axis])

@@ -127,6 +127,15 @@ kinds! {
             /// Time.
             t: f64,
         } => "the divergence of the velocity at t = {t} is {value}",
+        /// A flow across a mirror, where its divergence is to be computed: behind a mirror the normal component is turned.
+        CrossesMirror {
+            /// The axis of the mirror.
+            axis: usize,
+            /// The component along it, at the foot of the particle on the mirror.
+            value: f64,
+            /// Time.
+            t: f64,
+        } => "component {axis} of the velocity is {value} on the mirror beside it at t = {t}, where it must vanish for a divergence computed from images",
         /// A source, or its change with u, that is not finite.
         Source {
             /// The field.

@@ -87,6 +87,10 @@ impl<const D: usize> Neighbors<D> for BruteForce<D> {
         self.placed.generation
     }
 
+    fn domain(&self) -> Option<&Domain<D>> {
+        Some(&self.placed.domain)
+    }
+
     fn for_each(&self, p: usize, cutoff: f64, mut visit: impl FnMut(Neighbor<D>)) {
         let (Some(target), Some(limit)) = (self.placed.targets().get(p), self.placed.limit(cutoff)) else {
             return;

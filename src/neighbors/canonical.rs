@@ -1,6 +1,7 @@
 //! A provider whose rows are sorted by separation, whatever the provider beneath.
 
 use super::{NeighborList, Neighbors};
+use crate::domain::Domain;
 use crate::error::Result;
 use crate::stencil::{Neighbor, Stencil};
 
@@ -35,6 +36,10 @@ impl<P: Neighbors<D>, const D: usize> Neighbors<D> for Canonical<P> {
 
     fn generation(&self) -> u64 {
         self.0.generation()
+    }
+
+    fn domain(&self) -> Option<&Domain<D>> {
+        self.0.domain()
     }
 
     fn for_each(&self, p: usize, cutoff: f64, visit: impl FnMut(Neighbor<D>)) {
@@ -81,6 +86,10 @@ impl<P: Neighbors<D>, const D: usize> Neighbors<D> for &P {
 
     fn generation(&self) -> u64 {
         (**self).generation()
+    }
+
+    fn domain(&self) -> Option<&Domain<D>> {
+        (**self).domain()
     }
 
     fn for_each(&self, p: usize, cutoff: f64, visit: impl FnMut(Neighbor<D>)) {

@@ -340,6 +340,10 @@ impl<const D: usize> Neighbors<D> for CellList<D> {
         self.placed.generation
     }
 
+    fn domain(&self) -> Option<&Domain<D>> {
+        Some(&self.placed.domain)
+    }
+
     fn for_each(&self, p: usize, cutoff: f64, mut visit: impl FnMut(Neighbor<D>)) {
         self.scan(p, cutoff, |target, slots, _| slots.iter().for_each(|&slot| visit(self.neighbor(target, slot))));
     }

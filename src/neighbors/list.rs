@@ -37,6 +37,7 @@ pub struct NeighborList<const D: usize> {
     cutoffs: Vec<f64>,
     reach: f64,
     generation: u64,
+    domain: Option<Domain<D>>,
     rows: Rows<D>,
 }
 
@@ -57,6 +58,7 @@ impl<const D: usize> NeighborList<D> {
         let (targets, reach) = (provider.targets(), provider.reach());
         let mut list = Self::with_room(targets, provider.sources(), reach, provider.generation())?;
         list.owned = provider.owned();
+        list.domain = provider.domain().copied();
         let mut blocks = reserved(targets.div_ceil(ROWS))?;
         let mut block = Block::empty();
         for p in 0..targets {
@@ -74,6 +76,7 @@ impl<const D: usize> NeighborList<D> {
     pub(super) fn linked(placed: &Arc<Placed<D>>, links: Vec<Links>) -> Result<Self> {
         let targets = placed.targets().len();
         let mut list = Self::with_room(targets, placed.sources.len(), placed.cutoff, placed.generation)?;
+        list.domain = Some(placed.domain);
         for p in 0..targets {
             list.end_row(targets, placed.center(p), placed.cutoff);
         }
@@ -164,7 +167,14 @@ impl<const D: usize> NeighborList<D> {
         }
         let mut centers = reserved(particles.len())?;
         centers.extend((0..particles.len()).map(Some));
-        Self::from_rows(particles.len(), &centers, offsets, &neighbors, cutoff, particles.generation())
+        let list = Self::from_rows(particles.len(), &centers, offsets, &neighbors, cutoff, particles.generation())?;
+        Ok(list.in_domain(domain))
+    }
+
+    /// The same rows, said to hold images of this domain; needed of rows of your own with images behind mirrors.
+    #[must_use]
+    pub fn in_domain(self, domain: &Domain<D>) -> Self {
+        Self { domain: Some(*domain), ..self }
     }
 
     pub(super) fn into_rows(self) -> Rows<D> {
@@ -179,7 +189,16 @@ impl<const D: usize> NeighborList<D> {
     fn with_room(targets: usize, sources: usize, reach: f64, generation: u64) -> Result<Self> {
         check_count(sources, PARTICLES_HIGH)?;
         let (centers, cutoffs) = (reserved(targets)?, reserved(targets)?);
-        Ok(Self { sources, owned: sources, centers, cutoffs, reach, generation, rows: Rows::Measured(Arc::default()) })
+        Ok(Self {
+            sources,
+            owned: sources,
+            centers,
+            cutoffs,
+            reach,
+            generation,
+            domain: None,
+            rows: Rows::Measured(Arc::default()),
+        })
     }
 
     /// Notes center and cutoff of the next target; whether a block of rows ends here.
@@ -218,6 +237,10 @@ impl<const D: usize> Neighbors<D> for NeighborList<D> {
 
     fn generation(&self) -> u64 {
         self.generation
+    }
+
+    fn domain(&self) -> Option<&Domain<D>> {
+        self.domain.as_ref()
     }
 
     fn for_each(&self, p: usize, cutoff: f64, visit: impl FnMut(Neighbor<D>)) {

@@ -16,6 +16,7 @@ mod overlap;
 mod pair;
 mod placed;
 mod quality;
+mod reflected;
 mod row_check;
 mod rows;
 mod selected;
@@ -35,12 +36,14 @@ pub use nearest::Nearest;
 pub use overlap::{fill_distance, least_gap};
 pub use pair::{Pair, Symmetry};
 pub use quality::SetQuality;
+pub(crate) use reflected::Reflected;
 pub use selected::Selected;
 #[cfg(feature = "kiddo")]
 pub use tree::KdTree;
 pub use upstream::Upstream;
 pub use verlet::VerletList;
 
+use crate::domain::Domain;
 use crate::error::Result;
 use crate::stencil::{Neighbor, Stencil};
 
@@ -78,6 +81,11 @@ pub trait Neighbors<const D: usize>: Sync {
 
     /// The generation of the particle set this provider answers for.
     fn generation(&self) -> u64;
+
+    /// The domain whose images stand in the rows. `None`, as by default, says that no image stands behind a mirror.
+    fn domain(&self) -> Option<&Domain<D>> {
+        None
+    }
 
     /// Visits every neighbor of p with |x_p - x_q| <= `cutoff`, but the center.
     fn for_each(&self, p: usize, cutoff: f64, visit: impl FnMut(Neighbor<D>))

@@ -196,6 +196,10 @@ impl<const D: usize> Neighbors<D> for Nearest<D> {
         self.level(0.0).map_or(0, CellList::generation)
     }
 
+    fn domain(&self) -> Option<&Domain<D>> {
+        self.level(0.0)?.domain()
+    }
+
     fn for_each(&self, p: usize, cutoff: f64, visit: impl FnMut(Neighbor<D>)) {
         if let Some(level) = self.level(cutoff) {
             level.for_each(p, cutoff, visit);

@@ -1,6 +1,7 @@
 //! Some targets of another provider.
 
 use super::Neighbors;
+use crate::domain::Domain;
 use crate::error::{NeighborError, Result};
 use crate::stencil::{Neighbor, Stencil};
 
@@ -71,6 +72,10 @@ impl<P: Neighbors<D>, const D: usize> Neighbors<D> for Selected<P> {
 
     fn generation(&self) -> u64 {
         self.all.generation()
+    }
+
+    fn domain(&self) -> Option<&Domain<D>> {
+        self.all.domain()
     }
 
     fn for_each(&self, i: usize, cutoff: f64, visit: impl FnMut(Neighbor<D>)) {

@@ -2,6 +2,7 @@
 
 use super::Neighbors;
 use super::placed::{distance_squared, within};
+use crate::domain::Domain;
 use crate::error::Result;
 use crate::particles::reserved;
 use crate::scale::Spacing;
@@ -142,6 +143,10 @@ impl<P: Neighbors<D>, const D: usize> Neighbors<D> for Upstream<'_, P> {
 
     fn generation(&self) -> u64 {
         self.provider.generation()
+    }
+
+    fn domain(&self) -> Option<&Domain<D>> {
+        self.provider.domain()
     }
 
     fn for_each(&self, p: usize, cutoff: f64, mut visit: impl FnMut(Neighbor<D>)) {

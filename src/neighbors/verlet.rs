@@ -216,6 +216,10 @@ impl<const D: usize> Neighbors<D> for VerletList<D> {
         self.placed.generation
     }
 
+    fn domain(&self) -> Option<&Domain<D>> {
+        Some(&self.placed.domain)
+    }
+
     fn for_each(&self, p: usize, cutoff: f64, mut visit: impl FnMut(Neighbor<D>)) {
         self.walk(p, cutoff, |_, neighbor| visit(neighbor));
     }

@@ -58,7 +58,8 @@ impl<V: Velocity<D>, X: Transport<D>, W: FlowDivergence<D>, const D: usize, E: F
         let points = site.points();
         let flow = |p: usize| self.velocity.at(p, &points[p], 0.0);
         let rows = self.scheme.build(site, flow, self.velocity.steady(), neighbors)?;
-        let mut built = AdvectionRows { rows, divergence: W::Values::default(), rates: None };
+        let divergence = self.divergence.build(&self.scheme, site, neighbors)?;
+        let mut built = AdvectionRows { rows, divergence, rates: None };
         if self.velocity.steady() {
             self.refresh_divergence::<D, E>(&mut built, site, 0.0, true)?;
             built.rates = Some(self.fastest::<D, E>(&built.rows, site, 0.0)?);

@@ -126,6 +126,11 @@ macro_rules! central {
                 let of: fn(&Self) -> &_ = $of;
                 CentralRows::build(of(self), site, neighbors)
             }
+
+            fn gradient<P: Neighbors<D>>(&self, site: &Site<D>, neighbors: &P) -> Result<Option<Rows<[f64; D]>>> {
+                let of: fn(&Self) -> &_ = $of;
+                Rows::assemble(&site.screened(of(self)), neighbors).map(Some)
+            }
         }
     )* };
 }

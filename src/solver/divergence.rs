@@ -2,7 +2,10 @@
 
 use super::coefficient::Velocity;
 use super::term::Site;
+use super::transport::Transport;
+use crate::apply::Rows;
 use crate::error::{Error, Result, SolverError};
+use crate::neighbors::{Neighbors, Reflected};
 
 /// What a scene knows of div v. The unit type says that it is zero.
 pub trait FlowDivergence<const D: usize>: Sync {
@@ -15,11 +18,26 @@ pub trait FlowDivergence<const D: usize>: Sync {
     /// Sweeps over stored rows a stage.
     const APPLIES: usize;
 
+    /// Makes what is kept.
+    ///
+    /// # Errors
+    /// As [`Transport::gradient`].
+    fn build<X: Transport<D>, P: Neighbors<D>>(
+        &self,
+        scheme: &X,
+        site: &Site<D>,
+        neighbors: &P,
+    ) -> Result<Self::Values> {
+        let _ = (scheme, site, neighbors);
+        Ok(Self::Values::default())
+    }
+
     /// Computes it anew at time t, where that takes the velocity of all particles; `first` before the first step of a
     /// steady flow. `of(p, v)` is the divergence of the velocities v at particle p by the rows of the scheme.
     ///
     /// # Errors
-    /// [`SolverError::Divergence`] naming the particle, with a value that is NaN where the scheme has no rows for it.
+    /// [`SolverError::Divergence`] naming the particle, with a value that is NaN where the scheme has no rows for it;
+    /// [`SolverError::CrossesMirror`] naming a particle beside a mirror that the flow crosses.
     fn refresh(
         &self,
         values: &mut Self::Values,
@@ -66,8 +84,9 @@ impl<F: Fn(&[f64; D], f64) -> f64 + Sync, const D: usize> FlowDivergence<D> for 
 /// div v by the central rows of the scheme, sum_k sum_q w_k,pq (v_k,q - v_k,p): once for a steady velocity, otherwise
 /// every stage.
 ///
-/// An image behind a mirror has the velocity of its particle, normal component included. Beside mirror faces that the flow
-/// does not cross, give the divergence as a function.
+/// Behind a mirror the normal component of the velocity is turned and the others are not, whatever the sign of u there: the
+/// flow must not cross a mirror. Of a velocity that is known between the particles this is checked. Rows of the particles
+/// beside mirrors are kept for it, D for each.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ComputedDivergence;
 
@@ -76,12 +95,88 @@ pub struct ComputedDivergence;
 pub struct DivergenceValues<const D: usize> {
     velocity: Vec<[f64; D]>,
     divergence: Vec<f64>,
+    walls: Option<Walls<D>>,
+}
+
+/// What the divergence beside mirrors is computed with.
+#[derive(Clone, Debug)]
+struct Walls<const D: usize> {
+    /// Particle, axis and place of every mirror within reach of a free particle, in the order of the particles.
+    beside: Vec<(usize, usize, f64)>,
+    /// The gradient of a field that mirrors of axis k turn, at those particles; none where the scheme has no such rows.
+    turned: Vec<Rows<[f64; D]>>,
+    /// The gradient of a field that no mirror turns.
+    plain: Option<Rows<[f64; D]>>,
+}
+
+/// How much of the largest speed may stand normal to a mirror: rounding of the velocity and of the place.
+const CROSSING: f64 = 1e-8;
+
+impl<const D: usize> Walls<D> {
+    fn build<X: Transport<D>, P: Neighbors<D>>(scheme: &X, site: &Site<D>, neighbors: &P) -> Result<Option<Self>> {
+        if !neighbors.domain().is_some_and(|domain| (0..D).any(|axis| domain.mirrors(axis).next().is_some())) {
+            return Ok(None);
+        }
+        let points = site.points();
+        let seen = Reflected::new(neighbors, points, None);
+        let mut beside = Vec::new();
+        let mut far = Vec::new();
+        for p in 0..points.len() {
+            let before = beside.len();
+            if !site.prescribed(p) {
+                neighbors.for_each(p, neighbors.reach(), |neighbor| {
+                    for axis in 0..D {
+                        if let Some(place) = seen.mirror(p, axis, &neighbor)
+                            && !beside[before..].contains(&(p, axis, place))
+                        {
+                            beside.push((p, axis, place));
+                        }
+                    }
+                });
+            }
+            if beside.len() == before {
+                far.push(p);
+            }
+        }
+        let mut near = site.clone();
+        near.prescribe(far);
+        let plain = scheme.gradient(&near, &seen)?;
+        let mut turned = Vec::new();
+        for axis in 0..D {
+            turned.extend(scheme.gradient(&near, &Reflected::new(neighbors, points, Some(axis)))?);
+        }
+        Ok(Some(Self { beside, turned, plain }))
+    }
+
+    /// div v at a particle beside a mirror: only what the turned rows have on the diagonal beyond the others stands for
+    /// images, so that constants along a wall have none.
+    fn divergence(&self, p: usize, v: &[[f64; D]]) -> Option<f64> {
+        let (own, of_constants) = (v.get(p)?, self.plain.as_ref()?.pairs(p).0.unwrap_or([0.0; D]));
+        let mut sum = 0.0;
+        for (axis, rows) in self.turned.iter().enumerate() {
+            let (diagonal, pairs) = rows.pairs(p);
+            sum += (diagonal.map_or(0.0, |d| d[axis]) - of_constants[axis]) * own[axis];
+            for (q, w) in pairs {
+                sum += w[axis] * (v.get(q)?[axis] - own[axis]);
+            }
+        }
+        Some(sum)
+    }
 }
 
 impl<const D: usize> FlowDivergence<D> for ComputedDivergence {
     type Values = DivergenceValues<D>;
     const ZERO: bool = false;
     const APPLIES: usize = 1;
+
+    fn build<X: Transport<D>, P: Neighbors<D>>(
+        &self,
+        scheme: &X,
+        site: &Site<D>,
+        neighbors: &P,
+    ) -> Result<DivergenceValues<D>> {
+        Ok(DivergenceValues { walls: Walls::build(scheme, site, neighbors)?, ..Default::default() })
+    }
 
     fn refresh(
         &self,
@@ -96,15 +191,26 @@ impl<const D: usize> FlowDivergence<D> for ComputedDivergence {
             return Ok(());
         }
         let points = site.points();
-        values.velocity.clear();
-        values.velocity.extend(points.iter().enumerate().map(|(p, x)| velocity.at(p, x, t)));
-        values.divergence.clear();
+        let DivergenceValues { velocity: v, divergence, walls } = values;
+        v.clear();
+        v.extend(points.iter().enumerate().map(|(p, x)| velocity.at(p, x, t)));
+        let beside = walls.as_ref().map_or(&[][..], |walls| &walls.beside);
+        check_crossing(beside, points, v, t, velocity)?;
+        let mut beside = beside.iter().map(|&(p, ..)| p).peekable();
+        divergence.clear();
         for p in 0..points.len() {
-            let value = if site.prescribed(p) { 0.0 } else { of(p, &values.velocity).unwrap_or(f64::NAN) };
+            let wall = beside.next_if_eq(&p).and(walls.as_ref());
+            while beside.next_if_eq(&p).is_some() {}
+            let value = match wall {
+                _ if site.prescribed(p) => Some(0.0),
+                Some(walls) => walls.divergence(p, v),
+                None => of(p, v),
+            };
+            let value = value.unwrap_or(f64::NAN);
             if !value.is_finite() {
                 return Err(Error::from(SolverError::Divergence { value, t }).at(p));
             }
-            values.divergence.push(value);
+            divergence.push(value);
         }
         Ok(())
     }
@@ -113,4 +219,30 @@ impl<const D: usize> FlowDivergence<D> for ComputedDivergence {
     fn at(&self, values: &DivergenceValues<D>, p: usize, _: &[f64; D], _: f64) -> Option<f64> {
         values.divergence.get(p).copied()
     }
+}
+
+/// Refuses a flow across mirrors; at a velocity that is known only at the particles it cannot be looked at.
+fn check_crossing<const D: usize>(
+    beside: &[(usize, usize, f64)],
+    points: &[[f64; D]],
+    v: &[[f64; D]],
+    t: f64,
+    velocity: &impl Velocity<D>,
+) -> Result<()> {
+    fn everywhere<const D: usize, V: Velocity<D>>(_: &V) -> bool {
+        V::EVERYWHERE
+    }
+    if beside.is_empty() || !everywhere(velocity) {
+        return Ok(());
+    }
+    let largest = v.iter().flatten().fold(0.0_f64, |largest, v| largest.max(v.abs()));
+    for &(p, axis, place) in beside {
+        let mut foot = points[p];
+        foot[axis] = place;
+        let value = velocity.at(p, &foot, t)[axis];
+        if !(value.abs() <= CROSSING * largest) {
+            return Err(Error::from(SolverError::CrossesMirror { axis, value, t }).at(p));
+        }
+    }
+    Ok(())
 }

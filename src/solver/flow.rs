@@ -167,7 +167,8 @@ impl<'a, V: Velocity<D>, const D: usize> Gradients<'a, V, D> {
             return Ok(gradients);
         }
         let method = DcPse::<Gradient<D>, 2>::new();
-        let nearest = Nearest::build(site.particles(), domain, method.fewest_neighbors()?)?;
+        // An image has the normal velocity of its particle turned; rows of one side need none.
+        let nearest = Nearest::build(site.particles(), &domain.without_mirrors(), method.fewest_neighbors()?)?;
         let rows = MatrixFree::new(&method, &nearest)?;
         let points = site.points();
         let mut made = vec![[[0.0; D]; D]; points.len()];

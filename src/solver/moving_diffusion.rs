@@ -388,6 +388,10 @@ impl<const D: usize> Neighbors<D> for Within<'_, D> {
         self.list.generation()
     }
 
+    fn domain(&self) -> Option<&Domain<D>> {
+        self.list.domain()
+    }
+
     fn for_each(&self, p: usize, cutoff: f64, visit: impl FnMut(Neighbor<D>)) {
         self.list.for_each(p, cutoff, visit);
     }

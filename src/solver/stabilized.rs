@@ -129,6 +129,10 @@ impl<const D: usize, const R: u32> Transport<D> for Stabilized<D, R> {
             powers: [Vec::new(), Vec::new()],
         })
     }
+
+    fn gradient<P: Neighbors<D>>(&self, site: &Site<D>, neighbors: &P) -> Result<Option<Rows<[f64; D]>>> {
+        Rows::assemble(&site.screened(&self.gradient), neighbors).map(Some)
+    }
 }
 
 impl<const D: usize, E: Fields> TransportRows<D, E> for StabilizedRows<D, E> {

@@ -3,7 +3,7 @@
 use super::fields::Fields;
 use super::limits::Rate;
 use super::term::Site;
-use crate::apply::Report;
+use crate::apply::{Report, Rows};
 use crate::error::Result;
 use crate::neighbors::Neighbors;
 
@@ -29,7 +29,7 @@ pub trait Transport<const D: usize>: Sync {
     /// upstream; `steady` says whether it stays.
     ///
     /// # Errors
-    /// As [`Rows::assemble`](crate::Rows::assemble).
+    /// As [`Rows::assemble`].
     fn build<E: Fields, P: Neighbors<D>>(
         &self,
         site: &Site<D>,
@@ -37,6 +37,16 @@ pub trait Transport<const D: usize>: Sync {
         steady: bool,
         neighbors: &P,
     ) -> Result<Self::Rows<E>>;
+
+    /// The central rows of the gradient at free particles, where the scheme has such rows: for the divergence of a velocity
+    /// beside mirrors.
+    ///
+    /// # Errors
+    /// As [`Rows::assemble`].
+    fn gradient<P: Neighbors<D>>(&self, site: &Site<D>, neighbors: &P) -> Result<Option<Rows<[f64; D]>>> {
+        let _ = (site, neighbors);
+        Ok(None)
+    }
 
     /// The numerical viscosity of order 1 along a velocity v at particle p, in the units of a diffusivity; 0 for schemes
     /// of higher order.
@@ -76,7 +86,7 @@ pub trait TransportRows<const D: usize, E: Fields>: Send + Sync {
         false
     }
 
-    /// The divergence of a velocity field at particle p, by central rows; `None` where the scheme has none.
+    /// The divergence of a velocity field at particle p, far from mirrors, by central rows; `None` where the scheme has none.
     fn divergence(&self, p: usize, v: &[[f64; D]]) -> Option<f64> {
         let _ = (p, v);
         None

@@ -3,6 +3,7 @@
 //! Each returns the first promise that is broken, with the numbers. A [`Promise`] is a bound that a test asserts and
 //! records; a [`Verification`] is the table of all that were recorded.
 
+mod fuzz;
 mod kernel;
 mod mesh_kernel;
 mod method;
@@ -15,6 +16,7 @@ mod stepper;
 mod stepper_fault;
 mod verification;
 
+pub use fuzz::{FuzzFault, FuzzOutcome, fuzz_neighbor_build, fuzz_operator_build};
 pub use kernel::{KernelFault, KernelLimits, check_kernel};
 pub use mesh_kernel::{MeshKernelFault, check_mesh_kernel};
 pub use method::{check_method, check_method_moments};

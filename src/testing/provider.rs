@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use crate::domain::Domain;
 use crate::neighbors::Neighbors;
 use crate::stencil::{Neighbor, Stencil};
 
@@ -94,6 +95,11 @@ pub enum ProviderFault {
         /// Its neighbor.
         q: usize,
     },
+    /// Mirrors of the oracle that the provider does not tell of by its domain, or others.
+    Mirrors {
+        /// The axis.
+        axis: usize,
+    },
     /// The row differs from that of the oracle.
     NotTheOracle {
         /// Target (the number of targets where that differs).
@@ -135,7 +141,7 @@ pub fn check_provider<const D: usize>(provider: &impl Neighbors<D>) -> Result {
 }
 
 /// Checks a provider as [`check_provider`] does, and that its rows are those of `oracle` as sets, bit for bit, at
-/// the smaller of the two reaches and below.
+/// the smaller of the two reaches and below. Where the oracle has mirrors, the provider tells of the same.
 ///
 /// [`BruteForce`](crate::BruteForce) on the same points and domain is the oracle to take.
 ///
@@ -145,6 +151,10 @@ pub fn check_provider_against<const D: usize>(provider: &impl Neighbors<D>, orac
     if provider.targets() != oracle.targets() || provider.sources() != oracle.sources() {
         let (p, found, expected) = (provider.targets(), provider.sources(), oracle.sources());
         return Err(ProviderFault::NotTheOracle { p, found, expected });
+    }
+    let mirrors = |domain: Option<&Domain<D>>, axis| domain.map_or(vec![], |domain| domain.mirrors(axis).collect());
+    if let Some(axis) = (0..D).find(|&axis| mirrors(provider.domain(), axis) != mirrors(oracle.domain(), axis)) {
+        return Err(ProviderFault::Mirrors { axis });
     }
     check_rows(provider, false)?;
     let reach = provider.reach().min(oracle.reach());

@@ -273,6 +273,18 @@ fn rows_of_another_generation_are_told_from_their_own() -> Result<()> {
 }
 
 #[test]
+fn crowds_that_break_a_limit_are_refused_before_all_of_them_are_looked_at() -> Result<()> {
+    // 1e10 pairs would take minutes.
+    let crowd = Particles::new(vec![[0.5; 2]; 100_000])?;
+    let pse = laplacian(0.05, &Volumes::equal(1e-4)?);
+    let cells = CellList::build(&crowd, &Domain::open(), pse.cutoff())?;
+    let error = pse.assemble(&cells).unwrap_err();
+    assert!(matches!(error.kind(), ErrorKind::Operator(OperatorError::Moment { .. })), "{error}");
+    assert_eq!((error.particle(), pse.matrix_free(&cells).err()), (Some(0), Some(error)));
+    Ok(())
+}
+
+#[test]
 fn excluded_neighbors_are_skipped_and_never_multiplied_by_zero() -> Result<()> {
     // Sources 1 and 2 are beyond the cutoff of the method though the list holds them; a term of theirs would be
     // 0 * 1e308 * 1e308, and with the moments z^alpha 0 * infinity.

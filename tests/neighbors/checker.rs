@@ -197,10 +197,15 @@ fn every_fault_of_a_provider_is_caught() {
     assert_eq!(fault(Wrong::OneSided), ProviderFault::NotSymmetric { p: 3, q: 4 });
 
     let points = (0..8).map(|i| [f64::from(i)]).collect();
-    let oracle = BruteForce::build(&Particles::new(points).unwrap(), &Domain::open(), Cutoff(2.5)).unwrap();
+    let eight = Particles::new(points).unwrap();
+    let oracle_in = |domain: &Domain<1>| BruteForce::build(&eight, domain, Cutoff(2.5)).unwrap();
+    let oracle = oracle_in(&Domain::open());
     assert_eq!(check_provider(&Faulty(Wrong::Lost, line())), Ok(()));
     let against = |wrong| check_provider_against(&Faulty(wrong, line()), &oracle).unwrap_err();
     assert_eq!(against(Wrong::Lost), ProviderFault::NotTheOracle { p: 3, found: 3, expected: 4 });
+    let beside = Domain::new([-0.5], [f64::INFINITY], [[Face::MirrorEven, Face::Open]]).unwrap();
+    let mirrored = oracle_in(&beside);
+    assert_eq!(check_provider_against(&line(), &mirrored), Err(ProviderFault::Mirrors { axis: 0 }));
     assert_eq!(against(Wrong::Targets), ProviderFault::NotTheOracle { p: 7, found: 8, expected: 8 });
 }
 

@@ -15,7 +15,7 @@ const BOUNDED: f64 = 0.3;
 const D0: f64 = 0.05;
 
 /// Least-squares slope of log error over log h.
-fn order(errors: &[(f64, f64)]) -> f64 {
+pub fn order(errors: &[(f64, f64)]) -> f64 {
     let logs: Vec<_> = errors.iter().map(|(h, e)| (h.ln(), e.ln())).collect();
     let n = logs.len() as f64;
     let (x, y) = logs.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));

@@ -246,7 +246,7 @@ fn particles_cross_just_above_the_sharp_limit_and_not_below() -> Result<()> {
         let mut run = Lagrangian::new(scene, &diagonal, &[1.0; 2], &Domain::open(), Euler::new())?
             .courant(0.999)?
             .step_policy(StepPolicy::Allow);
-        let within = dt <= run.limits()?.step(&Euler::<MovingState<2, f64>>::new());
+        let within = dt <= run.longest_step()?;
         run.step(dt)?;
         assert_eq!(run.ledger().within_limit, within);
         assert_eq!(within, dt < 0.5);
@@ -270,6 +270,7 @@ fn lagrangian_cfl_refuses_adapts_and_allows_by_policy() -> Result<()> {
     let ErrorKind::Solver(SolverError::Limit { dt, limit, binding }) = error.kind() else { panic!("{error}") };
     assert_eq!((*dt, *binding), (0.2, Limit::Distortion));
     assert!((limit - 0.125).abs() < 1e-9);
+    assert_eq!(refusing.longest_step()?, *limit);
     assert_eq!(picture(&refusing), before);
     let mut adapting = run(StepPolicy::Adapt { most: 2 })?;
     let row = adapting.step(0.2)?;

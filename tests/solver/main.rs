@@ -2,6 +2,7 @@
 
 #[path = "../linear/dense/mod.rs"]
 mod dense;
+mod divergence;
 mod eulerian;
 mod eulerian_faults;
 mod eulerian_ledger;
