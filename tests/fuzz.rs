@@ -4,7 +4,7 @@
 mod cases;
 
 use parops::Random;
-use parops::testing::{FuzzFault, FuzzOutcome, fuzz_neighbor_build, fuzz_operator_build};
+use parops::testing::{FuzzFault, FuzzOutcome, Promise, fuzz_neighbor_build, fuzz_operator_build};
 
 type Target = fn(&[u8]) -> Result<FuzzOutcome, FuzzFault>;
 
@@ -19,12 +19,19 @@ fn random_bytes(random: &mut Random) -> Vec<u8> {
     (0..below(random, LONGEST)).map(|_| below(random, 256) as u8).collect()
 }
 
+fn promise(text: &'static str) -> Promise {
+    Promise::new("Input", text)
+}
+
 /// Runs the target and tells whether something was built.
 fn built(target: Target, bytes: &[u8]) -> bool {
-    match target(bytes) {
-        Ok(outcome) => outcome == FuzzOutcome::Built,
-        Err(fault) => panic!("{fault}\nbytes: {bytes:?}"),
+    let outcome = target(bytes);
+    if let Err(fault) = &outcome {
+        println!("{fault}\nbytes: {bytes:?}");
     }
+    promise("what fuzzed bytes build equals the oracle and its moments, or is refused for a reason")
+        .holds(outcome.is_ok());
+    outcome.is_ok_and(|outcome| outcome == FuzzOutcome::Built)
 }
 
 /// The share of random bytes from which something is built.
@@ -61,23 +68,23 @@ fn share_of_scenes(target: Target, seed: u64) -> f64 {
 #[test]
 fn neighbors_built_from_random_bytes_equal_the_oracle_or_are_refused_for_a_reason() {
     let share = share_of_random_bytes(fuzz_neighbor_build, 1);
-    assert!((0.4..0.9).contains(&share), "{share}");
+    promise("share of random bytes that build neighbors").within(0.4, 0.9, share);
 }
 
 #[test]
 fn neighbors_built_from_plausible_scenes_equal_the_oracle() {
     let share = share_of_scenes(fuzz_neighbor_build, 2);
-    assert!(share > 0.6, "{share}");
+    promise("share of plausible scenes that build neighbors").at_least(0.6, share);
 }
 
 #[test]
 fn operators_built_from_random_bytes_keep_their_promises_or_are_refused_for_a_reason() {
     let share = share_of_random_bytes(fuzz_operator_build, 3);
-    assert!((0.15..0.9).contains(&share), "{share}");
+    promise("share of random bytes that build operators").within(0.15, 0.9, share);
 }
 
 #[test]
 fn operators_built_from_plausible_scenes_keep_their_promises() {
     let share = share_of_scenes(fuzz_operator_build, 4);
-    assert!(share > 0.3, "{share}");
+    promise("share of plausible scenes that build operators").at_least(0.3, share);
 }

@@ -56,7 +56,8 @@ fn run() -> Result<usize, Box<dyn Error>> {
         fs::write(root.join(PAGE), &page)?;
     }
     let mut faults: Vec<String> = shown.broken().map(|promise| format!("broken: {promise}")).collect();
-    faults.extend(shown.differences(&fs::read_to_string(root.join(PAGE))?));
+    let stated = fs::read_to_string(root.join(PAGE)).map_err(|error| format!("{PAGE}: {error}"))?;
+    faults.extend(shown.differences(&stated));
     faults.iter().for_each(|fault| println!("{fault}"));
     println!("promises: {} faults", faults.len());
     Ok(faults.len())

@@ -357,7 +357,7 @@ fn insulated_walls_of_order_four_grow_with_two_neighbors_per_condition_but_not_w
     let reason = "two neighbors a condition are too few where the wall value hardly counts: such rows are widened";
     let plain = of_sixty("plain rows of insulated walls, r = 4, 2 neighbors a condition: sets of 60 that grow");
     let with_two = growing(2.0);
-    plain.short_of(0.0, reason).at_most(30.0, with_two as f64);
+    plain.short_of(0.0, reason).at_most(4.0, with_two as f64);
     assert!(with_two > 0);
     of_sixty("plain rows of insulated walls, r = 4, 3 neighbors a condition: sets of 60 that grow")
         .at_most(0.0, growing(3.0) as f64);

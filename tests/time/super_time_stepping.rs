@@ -203,8 +203,8 @@ fn sharp(rows: &Rows, rate: f64) {
             (radius(rows, &mut *stepper, 0.99 * largest), radius(rows, &mut *stepper, 1.01 * largest));
         let radius = |text| Promise::new("Limits of steps", text);
         radius("spectral radius of explicit schemes at 0.99 of their limit").at_most(1.0 + 1e-10, inside);
-        radius("spectral radius of explicit schemes at 1.01 of their limit, beyond 1")
-            .at_least(f64::EPSILON, outside - 1.0);
+        let beyond = radius("spectral radius of explicit schemes at 1.01 of their limit, less 1");
+        beyond.in_units("eps", f64::EPSILON).at_least(1.0, outside - 1.0);
     }
 }
 
