@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use parops::{
     AdvectionDiffusion, Apply, Boundary, BoundaryCondition, Carried, CellList, DcPse, Domain, Euler, Eulerian,
     Gradient, ImplicitScheme, Lagrangian, Lambda, Laplacian, Mesh, Nearest, Neighbors, Particles, Plan, Pse, Remeshing,
-    Result, Rk4, Scene, Spacing, Stages, Trigger, UpwindGradient, integrate, steady,
+    Result, Rk4, Scene, Spacing, Stages, Trigger, UpwindGradient, integrate, steady, testing::Promise,
 };
 
 struct Measuring;
@@ -90,8 +90,17 @@ fn rows(pairs: f64, outputs: f64) -> f64 {
     NUMBER + pairs * (4.0 + outputs * NUMBER)
 }
 
-fn within(found: f64, bytes: f64) -> bool {
-    (bytes - CONSTANT..=bytes + CONSTANT).contains(&found)
+/// What was found is what the arithmetic says, in bytes a particle.
+fn exactly(what: &'static str, found: f64, bytes: f64) {
+    Promise::new("Allocations", format!("{what}, bytes a particle less the arithmetic")).within(
+        -CONSTANT,
+        CONSTANT,
+        found - bytes,
+    );
+}
+
+fn allocations(what: &'static str, most: f64, cost: &Cost) {
+    Promise::new("Allocations", what).at_most(most, cost.allocations as f64);
 }
 
 fn torus() -> Result<Domain<2>> {
@@ -133,10 +142,10 @@ fn derivative_takes_its_rows() -> Result<()> {
     let made = made?;
     // The signs of a first derivative are '+', so that there is a diagonal.
     let expected = rows(pairs(&neighbors, |p| neighbors.cutoff(p)), 2.0) + 2.0 * NUMBER;
-    assert!(within(assembly.held, expected), "{assembly:?} {expected}");
+    exactly("rows of a gradient", assembly.held, expected);
     assert!(assembly.peak <= expected * (1.0 + BLOCK), "{assembly:?}");
     // None of them a particle: scratch grows to the longest row, and then stays.
-    assert!(assembly.allocations <= 128, "{assembly:?}");
+    allocations("assembling a gradient of 4096 particles", 128.0, &assembly);
 
     let (values, mut slopes) = (vec![1.0; N], vec![[0.0; 2]; N]);
     let (applied, apply) = cost(|| made.apply_all(&values, &mut slopes));
@@ -153,8 +162,9 @@ fn lattice_diffusion_takes_rows_and_four_states_and_applies_once_a_stage() -> Re
     let laplacian = laplacian?;
     // Volumes and epsilon are one number each.
     let expected = rows(pairs(&neighbors, |_| pse.cutoff().0), 1.0);
-    assert!(within(assembly.held, expected), "{assembly:?} {expected}");
-    assert!(assembly.peak <= expected * (1.0 + BLOCK) && assembly.allocations <= 256, "{assembly:?}");
+    exactly("rows of PSE on a lattice", assembly.held, expected);
+    assert!(assembly.peak <= expected * (1.0 + BLOCK), "{assembly:?}");
+    allocations("assembling PSE on a lattice of 4096 particles", 256.0, &assembly);
 
     for steps in [2_u32, 20] {
         let plan = Plan::new(0.0, 1e-6 * f64::from(steps), 1e-6)?;
@@ -166,6 +176,7 @@ fn lattice_diffusion_takes_rows_and_four_states_and_applies_once_a_stage() -> Re
         let (done, run) = cost(|| integrate(&mut Rk4::new(), &mut u, &plan, heat, |_, _, _| {}));
         done?;
         // The copy that is stepped and three stages, however many steps there are.
+        allocations("a run of RK4 with any number of steps", 4.0, &run);
         assert_eq!((run.peak, run.allocations, applied), (4.0 * NUMBER, 4, 4 * steps));
     }
     Ok(())
@@ -196,7 +207,9 @@ fn poisson_takes_rows_three_matrices_and_two_bases() -> Result<()> {
     assert!(state?.u.len() == N);
     // The matrix, its factors, its transpose.
     let expected = rows(pairs, 1.0) + 3.0 * matrix(pairs + 1.0) + (BASES + VECTORS) * NUMBER;
-    assert!(solve.peak <= expected && solve.allocations <= 400, "{solve:?} {expected}");
+    let peak = Promise::new("Allocations", "peak of a steady solve over rows, three matrices and two bases");
+    peak.at_most(1.0, solve.peak / expected);
+    allocations("a steady solve of 4096 particles", 400.0, &solve);
     Ok(())
 }
 
@@ -217,13 +230,15 @@ fn upwind_takes_rows_and_places_and_sweeps_once_a_step() -> Result<()> {
     let mut run = run?;
     // Two weights a pair serve any velocity; four bytes say which sides a particle has.
     let expected = rows(pairs(&neighbors, |_| cutoff.0), 2.0) + POINT + 4.0;
-    assert!(within(build.held, expected), "{build:?} {expected}");
-    assert!(build.peak <= expected * (1.0 + BLOCK) && build.allocations <= 160, "{build:?}");
+    exactly("an upwind scene", build.held, expected);
+    assert!(build.peak <= expected * (1.0 + BLOCK), "{build:?}");
+    allocations("an upwind scene of 4096 particles", 160.0, &build);
 
     let mut u = vec![1.0; N];
     // Euler has a rate and the next state.
     let (stepped, first) = cost(|| run.step(&mut u, 1e-4).map(drop));
-    assert!(stepped.is_ok() && within(first.held, 2.0 * NUMBER), "{first:?}");
+    assert!(stepped.is_ok());
+    exactly("the first upwind step of Euler", first.held, 2.0 * NUMBER);
     calls.store(0, Relaxed);
     let (stepped, later) = cost(|| (0..5).try_for_each(|_| run.step(&mut u, 1e-4).map(drop)));
     // One velocity a particle for its row, one each for the limits at both ends of the step, because it may change.
@@ -251,7 +266,8 @@ fn remeshed_particles_take_places_and_strengths_and_no_rows() -> Result<()> {
     let mut run = run?;
     // Places of the state, of a step that may fail, of the stage, and of the stage inside the domain; strengths and
     // volumes do not change, and stand once.
-    assert!(within(build.held, 4.0 * POINT + 2.0 * NUMBER) && build.allocations <= 64, "{build:?}");
+    exactly("a remeshed run", build.held, 4.0 * POINT + 2.0 * NUMBER);
+    allocations("a remeshed run of 4096 particles", 64.0, &build);
 
     // Three stages of places.
     let (stepped, first) = cost(|| run.step(1e-4).map(drop));
@@ -263,9 +279,11 @@ fn remeshed_particles_take_places_and_strengths_and_no_rows() -> Result<()> {
         assert_eq!((stepped, calls.load(Relaxed)), (Ok(()), (4 + 2 * 5) * N));
         if remeshed {
             // Values on the mesh, new particles with strengths and volumes, and lists of the nodes in use.
-            assert!(step.peak <= 2.0 * POINT + 4.0 * NUMBER && step.allocations <= 32, "{step:?}");
+            assert!(step.peak <= 2.0 * POINT + 4.0 * NUMBER, "{step:?}");
+            allocations("a step with a remeshing", 32.0, &step);
         } else {
-            assert_eq!((step.peak, step.allocations), (0.0, 0));
+            assert_eq!(step.peak, 0.0);
+            allocations("a step between remeshings", 0.0, &step);
         }
     }
     assert_eq!(run.ledger().remeshings, 2);
@@ -287,14 +305,17 @@ fn implicit_steps_take_rows_and_three_matrices() -> Result<()> {
     let (run, build) = cost(|| Eulerian::new(scene, &set, &neighbors, ImplicitScheme::euler()));
     let mut run = run?;
     let expected = rows(pairs, 1.0) + POINT;
-    assert!(within(build.held, expected), "{build:?} {expected}");
-    assert!(build.peak <= expected + SPACE * NUMBER && build.allocations <= 640, "{build:?}");
+    exactly("an implicit scene", build.held, expected);
+    assert!(build.peak <= expected + SPACE * NUMBER, "{build:?}");
+    allocations("an implicit scene of 4096 particles", 640.0, &build);
 
     let mut u: Vec<f64> = set.points().iter().map(|x| (6.0 * x[0]).sin()).collect();
     let (stepped, first) = cost(|| run.step(&mut u, 0.1).map(drop));
     // The matrix of the scene, that of the step with room for a diagonal it may lack, its factors; which rows are algebraic.
     let expected = 3.0 * matrix(pairs + 1.0) + 12.0 + VECTORS * NUMBER + 1.0;
-    assert!(stepped.is_ok() && within(first.held, expected) && within(first.peak, expected), "{first:?} {expected}");
+    assert!(stepped.is_ok());
+    exactly("the first implicit step", first.held, expected);
+    exactly("the peak of the first implicit step", first.peak, expected);
     let (stepped, later) = cost(|| (0..5).try_for_each(|_| run.step(&mut u, 0.1).map(drop)));
     assert_eq!((stepped, later.peak, later.allocations), (Ok(()), 0.0, 0));
     Ok(())

@@ -8,35 +8,20 @@
 //!
 //! `cargo run --release --features faer --example poisson [-- --quick] [-- --out DIR]`
 
-#[cfg(feature = "faer")]
 mod field;
-#[cfg(feature = "faer")]
 #[path = "../figure/mod.rs"]
 mod figure;
-#[cfg(feature = "faer")]
 mod figures;
-#[cfg(feature = "faer")]
 #[path = "../map/mod.rs"]
 mod map;
-#[cfg(feature = "faer")]
 #[path = "../options/mod.rs"]
 mod options;
-#[cfg(feature = "faer")]
 mod sets;
-#[cfg(feature = "faer")]
 mod solve;
-#[cfg(feature = "faer")]
 mod study;
 
 use std::process::ExitCode;
 
-#[cfg(feature = "faer")]
 fn main() -> ExitCode {
     options::run("poisson", study::run)
-}
-
-#[cfg(not(feature = "faer"))]
-fn main() -> ExitCode {
-    eprintln!("poisson needs a sparse LU: cargo run --release --features faer --example poisson");
-    ExitCode::from(2)
 }

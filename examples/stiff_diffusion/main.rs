@@ -12,32 +12,18 @@
 //!
 //! `cargo run --release --features faer --example stiff_diffusion [-- --quick] [-- --out DIR]`
 
-#[cfg(feature = "faer")]
 mod claims;
-#[cfg(feature = "faer")]
 #[path = "../figure/mod.rs"]
 mod figure;
-#[cfg(feature = "faer")]
 mod figures;
-#[cfg(feature = "faer")]
 #[path = "../options/mod.rs"]
 mod options;
-#[cfg(feature = "faer")]
 mod scheme;
-#[cfg(feature = "faer")]
 mod setting;
-#[cfg(feature = "faer")]
 mod study;
 
 use std::process::ExitCode;
 
-#[cfg(feature = "faer")]
 fn main() -> ExitCode {
     options::run("stiff_diffusion", study::run)
-}
-
-#[cfg(not(feature = "faer"))]
-fn main() -> ExitCode {
-    eprintln!("stiff_diffusion needs a sparse LU: cargo run --release --features faer --example stiff_diffusion");
-    ExitCode::from(2)
 }

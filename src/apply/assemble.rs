@@ -3,7 +3,7 @@
 use super::blocks::{BLOCK, each_block};
 use super::rows::{Centers, Rows};
 use super::splice::Stray;
-use super::worker::{BATCH, Workers, cutoff};
+use super::worker::{BATCH, CROWD, Workers, cutoff};
 use super::{Field, MatrixFree, Report};
 use crate::domain::Domain;
 use crate::error::{Error, NeighborError, OperatorError, ParticleError, Result};
@@ -27,11 +27,13 @@ impl<S: Outputs, T: Field> Rows<S, T> {
     /// the one asked for;
     /// [`ParticleError::Memory`](crate::ParticleError::Memory) where the rows do not fit; what the method refuses;
     /// [`OperatorError::Weight`] where a weight is not finite, in `f64` or rounded to `T`; and
-    /// [`OperatorError::Overlap`] or [`OperatorError::Moment`] naming the worst row that breaks a limit without leave.
+    /// [`OperatorError::Overlap`] or [`OperatorError::Moment`] naming the worst row that breaks a limit without leave, or the
+    /// first of more than 65,536 neighbors.
     pub fn assemble<const D: usize, M: Method<D, Out = S>, P: Neighbors<D>>(method: &M, neighbors: &P) -> Result<Self> {
         let targets = neighbors.targets();
         method.validate(targets, neighbors.sources())?;
-        let offsets = count(method, neighbors)?;
+        let workers = Workers::default();
+        let offsets = count(method, neighbors, &workers)?;
         let pairs = offsets.last().copied().unwrap_or(0);
         let zero = S::ZERO.map(T::lift);
         let mut columns = filled(pairs, 0_u32)?;
@@ -45,7 +47,6 @@ impl<S: Outputs, T: Field> Rows<S, T> {
             weights: &mut weights,
             diagonal: &mut diagonal,
         };
-        let workers = Workers::default();
         let made = each_block(blocks, |mut block| {
             workers.with(method, |worker| {
                 let (mut report, mut strays) = (Report::default(), Vec::new());
@@ -82,14 +83,21 @@ fn filled<V: Copy>(count: usize, value: V) -> Result<Vec<V>> {
     Ok(values)
 }
 
-/// Where each row begins.
-fn count<const D: usize, M: Method<D>, P: Neighbors<D>>(method: &M, neighbors: &P) -> Result<Vec<usize>> {
+/// Where each row begins; a crowded row is made, so that it is refused before the others are counted.
+fn count<const D: usize, M: Method<D>, P: Neighbors<D>>(
+    method: &M,
+    neighbors: &P,
+    workers: &Workers<D, M>,
+) -> Result<Vec<usize>> {
     let targets = neighbors.targets();
     let mut offsets = filled(targets.saturating_add(1), 0_usize)?;
     each_block(offsets[1..].chunks_mut(BLOCK).enumerate(), |(b, counts)| {
         for (i, count) in counts.iter_mut().enumerate() {
             let p = b * BLOCK + i;
             *count = neighbors.count(p, cutoff(method, neighbors, p)?);
+            if *count > CROWD {
+                workers.with(method, |worker| worker.rows(method, neighbors, p..p + 1).map(drop))?;
+            }
         }
         Ok(())
     })?;

@@ -5,6 +5,33 @@ use crate::error::Result;
 /// Rows in one block of work.
 pub(super) const BLOCK: usize = 512;
 
+/// The lowest block that failed so far: those after it need not be done, those before it must be.
+#[cfg(feature = "rayon")]
+struct Lowest(std::sync::atomic::AtomicUsize);
+
+#[cfg(feature = "rayon")]
+impl Default for Lowest {
+    fn default() -> Self {
+        Self(usize::MAX.into())
+    }
+}
+
+#[cfg(feature = "rayon")]
+impl Lowest {
+    /// Does a block, or leaves it out where one before it has failed.
+    fn unless_after<R>(&self, b: usize, work: impl FnOnce() -> Result<R>) -> Option<Result<R>> {
+        use std::sync::atomic::Ordering::Relaxed;
+        if b > self.0.load(Relaxed) {
+            return None;
+        }
+        let done = work();
+        if done.is_err() {
+            self.0.fetch_min(b, Relaxed);
+        }
+        Some(done)
+    }
+}
+
 /// Does every block, on the threads of the pool where the feature `rayon` is on, and returns what they gave in order.
 ///
 /// # Errors
@@ -16,9 +43,10 @@ pub(super) fn each_block<B: Send, R: Send>(
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
-        let blocks: Vec<B> = blocks.collect();
-        let results: Vec<Result<R>> = blocks.into_par_iter().map(work).collect();
-        results.into_iter().collect()
+        let (blocks, lowest) = (blocks.collect::<Vec<B>>(), Lowest::default());
+        let results: Vec<Option<Result<R>>> =
+            blocks.into_par_iter().enumerate().map(|(b, block)| lowest.unless_after(b, || work(block))).collect();
+        results.into_iter().flatten().collect()
     }
     #[cfg(not(feature = "rayon"))]
     blocks.map(work).collect()
@@ -54,9 +82,10 @@ pub(super) fn each_part<T: Send>(
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
+        let lowest = Lowest::default();
+        let part = |(b, out)| lowest.unless_after(b, || work(b * BLOCK, out)).unwrap_or(Ok(()));
         // The reduction keeps the order of the blocks.
-        let done = out.par_chunks_mut(BLOCK).enumerate().map(|(b, out)| work(b * BLOCK, out));
-        done.reduce(|| Ok(()), Result::and)
+        out.par_chunks_mut(BLOCK).enumerate().map(part).reduce(|| Ok(()), Result::and)
     }
     #[cfg(not(feature = "rayon"))]
     out.chunks_mut(BLOCK).enumerate().try_for_each(|(b, out)| work(b * BLOCK, out))

@@ -6,11 +6,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::{Error, NeighborError, OperatorError, Result};
 use crate::neighbors::Neighbors;
-use crate::operator::{Draft, GROWTH, Method, Outputs};
+use crate::operator::{Draft, GROWTH, Method, Outputs, RowReport};
 use crate::stencil::Stencil;
 
 /// Rows made side by side.
 pub(super) const BATCH: usize = 8;
+
+/// A row of more neighbors that breaks a limit without leave is refused at once: the worst of many such rows is not worth
+/// waiting for, their pairs being the square of their number.
+pub(super) const CROWD: usize = 1 << 16;
 
 /// The drafts and the scratch one thread works with.
 pub(super) struct Worker<const D: usize, M: Method<D>> {
@@ -88,6 +92,11 @@ impl<const D: usize, M: Method<D>> Worker<D, M> {
                 mend(method, neighbors, p, draft, scratch)?;
             }
             check_draft(p, neighbors.sources(), draft)?;
+            if let (true, Ok(RowReport { breach: Some(breach), allowed: false, .. })) =
+                (draft.stencil.len() > CROWD, &draft.report)
+            {
+                return Err(breach.refuse(p));
+            }
         }
         Ok(drafts)
     }

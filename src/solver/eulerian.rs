@@ -9,8 +9,9 @@ use super::saved::SavedRun;
 use super::scene::Scene;
 use super::scheme::TimeScheme;
 use super::semi_discrete::SemiDiscrete;
+use super::substeps::Substeps;
 use super::watch::{check_budget, check_drift};
-use crate::error::{Limit, Result, SolverError, TimeError};
+use crate::error::{Limit, Result, TimeError};
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
 use crate::time::Plan;
@@ -322,25 +323,18 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         discrete.impose(t + dt, u)
     }
 
-    /// Cuts a step into substeps, each within the limit of its moment, and says how many.
+    /// Cuts a step into substeps, and says how many.
     fn cut(&mut self, u: &mut Vec<S::Value>, dt: f64, mut limits: Limits) -> Result<u32> {
-        let most = if let StepPolicy::Adapt { most } = self.steps { most } else { 0 };
-        let (mut t, end, mut done) = (self.t, self.t + dt, 0);
+        let mut left = Substeps::new(self.steps, self.t, dt, self.t + dt);
         loop {
-            let rest = end - t;
             let (limit, binding) = self.bound(&limits);
-            let parts = (rest / limit).ceil().max(1.0);
-            if !(parts <= f64::from(most - done.min(most))) {
-                let binding = binding.unwrap_or(Limit::Diffusion);
-                return Err(SolverError::Substeps { dt, limit, binding, most }.into());
+            let t = left.t;
+            let part = left.next(limit, binding)?;
+            self.substep(u, t, part)?;
+            if left.done() {
+                return Ok(left.taken);
             }
-            self.substep(u, t, rest / parts)?;
-            done += 1;
-            if parts == 1.0 {
-                return Ok(done);
-            }
-            t += rest / parts;
-            limits = self.limits_of(t, end - t, u)?;
+            limits = self.limits_of(left.t, left.rest(), u)?;
         }
     }
 }

@@ -7,6 +7,7 @@ use parops::{
     Expression, Gaussian, Gradient, Kernel, KernelError, Laplacian, MatrixFree, Method, MultiIndex, MultiIndexError,
     Neighbor, NeighborError, NeighborList, Neighbors, OperatorError, ParticleError, Particles, Plan, Policy, Pse,
     Result, Rk4, RowReport, Rows, Sign, Sph, SphForm, Stencil, StepLimit, Stepper, Term, TimeError, Volumes, integrate,
+    testing::Promise,
 };
 
 fn torus() -> Domain<2> {
@@ -151,6 +152,10 @@ fn rows() -> (Particles<2>, Rows, CellList<2>, Pse<parops::Exchange<2>>) {
     (particles, pse.assemble(&neighbors).unwrap(), neighbors, pse)
 }
 
+fn unchanged(text: &'static str) -> Promise {
+    Promise::new("Input", text)
+}
+
 #[test]
 fn wrong_lengths_and_fields_that_are_no_numbers_change_nothing() {
     let (_, stored, neighbors, pse) = rows();
@@ -165,7 +170,7 @@ fn wrong_lengths_and_fields_that_are_no_numbers_change_nothing() {
         ] {
             let mut out = vec![42.0; n];
             assert_eq!(operator.apply(f, &mut out).unwrap_err(), Error::from(due));
-            assert!(out.iter().all(|&x| x == 42.0));
+            unchanged("refused applications write nothing").holds(out.iter().all(|&x| x == 42.0));
         }
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             // Two bad values: the first is named, and its neighbors are not.
@@ -177,7 +182,7 @@ fn wrong_lengths_and_fields_that_are_no_numbers_change_nothing() {
             assert!(
                 matches!(*error.kind(), ErrorKind::Apply(ApplyError::Field { value }) if value.to_bits() == bad.to_bits())
             );
-            assert!(out.iter().all(|&x| x == 42.0));
+            unchanged("refused applications write nothing").holds(out.iter().all(|&x| x == 42.0));
         }
     }
 }
@@ -264,6 +269,18 @@ fn rows_of_another_generation_are_told_from_their_own() -> Result<()> {
     particles.set_points(&points)?;
     let stale = ApplyError::Stale { rows: built_for, set: particles.generation() };
     assert_eq!(rows.validate(particles.generation()), Err(Error::from(stale)));
+    Ok(())
+}
+
+#[test]
+fn crowds_that_break_a_limit_are_refused_before_all_of_them_are_looked_at() -> Result<()> {
+    // 1e10 pairs would take minutes.
+    let crowd = Particles::new(vec![[0.5; 2]; 100_000])?;
+    let pse = laplacian(0.05, &Volumes::equal(1e-4)?);
+    let cells = CellList::build(&crowd, &Domain::open(), pse.cutoff())?;
+    let error = pse.assemble(&cells).unwrap_err();
+    assert!(matches!(error.kind(), ErrorKind::Operator(OperatorError::Moment { .. })), "{error}");
+    assert_eq!((error.particle(), pse.matrix_free(&cells).err()), (Some(0), Some(error)));
     Ok(())
 }
 
@@ -604,7 +621,7 @@ fn illegal_steps_and_right_hand_sides_leave_state_and_operator_as_they_were() {
             |_: f64, _: &Field, _: &mut Field| -> Result<()> { std::panic::resume_unwind(Box::new("mine")) };
         let caught = catch_unwind(AssertUnwindSafe(|| stepper.step(0.0, 1e-3, &mut u, &mut panics)));
         assert!(caught.is_err());
-        assert_eq!((&u, &rows), (&start, &kept));
+        unchanged("refused and panicking steps leave state and rows").equal(&(&u, &rows), &(&start, &kept));
         let mut fresh = start.clone();
         stepper.step(0.0, 1e-4, &mut u, &mut diffuse).unwrap();
         stepper.reset();
@@ -628,7 +645,7 @@ fn step_above_the_limit_is_refused_before_the_first_evaluation_unless_allowed() 
         };
         let error = integrate(&mut stepper, &mut u, &plan, &mut rhs, |_, _, _| {}).unwrap_err();
         assert_eq!(*error.kind(), ErrorKind::Time(TimeError::Limit { dt: plan.dt(), limit: largest }));
-        assert_eq!(u, start);
+        unchanged("a step above the limit is refused before the first evaluation").equal(&u, &start);
         let run = integrate(&mut stepper, &mut u, &plan.policy(Policy::Allow), &mut rhs, |_, _, _| {})?;
         assert!(!run.within_limit && calls > 0);
     }

@@ -3,7 +3,7 @@
 use crate::cases::cases;
 use parops::{
     Apply, ApplyError, BruteForce, CellList, Cutoff, D2, DcPse, Domain, Error, ErrorKind, Face, Field, Laplacian,
-    Particles, Pse, Random, Rows, Strided,
+    Particles, Pse, Random, Rows, Strided, testing::Promise,
 };
 use proptest::prelude::*;
 
@@ -78,7 +78,8 @@ fn matrix_free_fields_have_the_bits_of_stored_rows() -> Failure {
     let (mut out, mut again) = (vec![[0.0; 4]; f.len()], vec![[0.0; 4]; f.len()]);
     stored.apply_fields(&f, &mut out)?;
     free.apply_fields(&f, &mut again)?;
-    assert_eq!(out, again);
+    Promise::new("Reproducibility", "matrix-free applications of several fields, bits of stored rows")
+        .equal(&out, &again);
     Ok(())
 }
 

@@ -2,7 +2,7 @@
 
 use parops::{
     Allowance, Apply, CellList, Cutoff, DcPse, Domain, Epsilon, Error, Exchange, Face, Gradient, Laplacian, Method,
-    PairScratch, Particles, Pse, Random, Report, Result, RowReport, Rows, Sign, Stencil, Strided,
+    PairScratch, Particles, Pse, Random, Report, Result, RowReport, Rows, Sign, Stencil, Strided, testing::Promise,
 };
 
 /// More rows than three blocks of work hold, with all kinds of faces.
@@ -135,7 +135,8 @@ fn errors(particles: &Particles<2>, domain: &Domain<2>) -> Vec<Error> {
 #[test]
 fn a_second_run_gives_the_same_bits_and_errors() {
     let (particles, domain) = particles();
-    assert_eq!(work(&particles, &domain), work(&particles, &domain));
+    let again = Promise::new("Reproducibility", "rows, reports, applications, bits of a second run");
+    again.equal(&work(&particles, &domain), &work(&particles, &domain));
     let errors = errors(&particles, &domain);
     assert_eq!(format!("{errors:?}"), format!("{:?}", self::errors(&particles, &domain)));
     assert_eq!(errors[1], Error::user(REFUSED[0] as i64).at(REFUSED[0]));
@@ -155,8 +156,10 @@ fn any_number_of_threads_gives_the_same_bits_and_errors() {
     for threads in [2, 3, 8] {
         for _ in 0..3 {
             let (again, error) = with(threads);
-            assert_eq!(bits, again, "{threads} threads");
-            assert_eq!(format!("{errors:?}"), format!("{error:?}"), "{threads} threads");
+            let same = |text| Promise::new("Reproducibility", text);
+            same("rows, reports, applications, bits on 1, 2, 3, 8 threads").equal(&bits, &again);
+            let (errors, error) = (format!("{errors:?}"), format!("{error:?}"));
+            same("first errors of builds and applications on 1, 2, 3, 8 threads").equal(&errors, &error);
         }
     }
 }

@@ -4,7 +4,7 @@
 use crate::stencils::{Stencils, candidates, condition, length, moments, monomials, terms};
 use parops::{
     CUTOFF_OVER_EPSILON, D1, D2, D3, DcPse, Domain, Epsilon, ErrorKind, Gradient, Laplacian, Nearest, Neighbors,
-    Operator, OperatorError, ParticleError, Particles, Random,
+    Operator, OperatorError, ParticleError, Particles, Random, testing::Promise,
 };
 
 /// What became of a row.
@@ -130,6 +130,10 @@ impl Kind {
     }
 }
 
+fn promise(text: &'static str, unit: &'static str, size: f64) -> Promise {
+    Promise::new("Residuals", text).in_units(unit, size)
+}
+
 /// The verdict on one stencil among easy ones, after the row has been measured.
 fn verdict<const D: usize, const K: usize, Op: Operator<D, Out = [f64; K]> + Clone>(
     operator: &Op,
@@ -190,8 +194,10 @@ fn verdict<const D: usize, const K: usize, Op: Operator<D, Out = [f64; K]> + Clo
         let residual = found.residual();
         // Weights are divided by epsilon^m in the library and multiplied by it here: m + 1 roundings each.
         let own = f64::from(degree + 1) * f64::EPSILON * found.terms;
-        assert!(residual <= 4.0 * unit * condition * required + own, "{residual:e} {condition:e} {terms:?}");
-        assert!(residual <= 30.0 * unit * found.terms, "{residual:e} {:e} {terms:?}", found.terms);
+        let size = unit * condition * required + 0.25 * own;
+        promise("residual of rows of the catalogue", "l eps cond beta!", size).at_most(4.0, residual);
+        promise("residual of rows of the catalogue by their terms", "l eps sum abs", unit * found.terms)
+            .at_most(30.0, residual);
     }
     Verdict::Accepted
 }
@@ -358,8 +364,11 @@ fn sets_far_from_the_origin_are_served_until_their_coordinates_are_illegal() {
                 row.sources.iter().map(|q| separation(q).map(|x: f64| x * (1.0 / epsilon))).collect();
             let (alphas, columns) = monomials(&z, 1, 3);
             let found = moments(&row, 0, &terms(&Laplacian::<2>)[0], (&alphas, &columns), &z, epsilon);
-            assert!(found.residual() <= 30.0 * 9.0 * f64::EPSILON * found.terms);
-            assert!(found.residual() <= 4.0 * 9.0 * f64::EPSILON * 2.0 * condition(&z, false, 1, 3));
+            let unit = 9.0 * f64::EPSILON;
+            promise("residual 10^9 spacings from the origin by its terms", "l eps sum abs", unit * found.terms)
+                .at_most(30.0, found.residual());
+            let size = unit * 2.0 * condition(&z, false, 1, 3);
+            promise("residual 10^9 spacings from the origin", "l eps cond beta!", size).at_most(4.0, found.residual());
         }
     }
 }

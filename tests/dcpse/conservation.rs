@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{DMatrix, DVector};
 use parops::{
     Allowance, Apply, CellList, Cutoff, DcPse, Domain, Error, Laplacian, Operator, Particles, Pse, Rows, Sign,
+    testing::Promise,
 };
 
 type Failure = Result<(), Error>;
@@ -46,8 +47,10 @@ fn heat_by_dcpse_changes_its_mass_by_percents_per_unit_time_and_by_pse_by_round_
             }
             let typical = f64::sqrt(squares);
             println!("r = {r}, {n} x {n}: {:.2} % per unit time; PSE {largest_of_pse:.1e} eps sum|w|", 100.0 * typical);
-            assert!(typical > 1e-3, "r = {r}, n = {n}: {typical} per unit time");
-            assert!(largest_of_pse < 1.0, "r = {r}, n = {n}: {largest_of_pse}");
+            let drifts = Promise::new("Conservation", "DC-PSE heat changes its mass, share per unit time");
+            drifts.at_least(1e-3, typical);
+            let keeps = Promise::new("Conservation", "PSE heat on the same sets, mass rate");
+            keeps.in_units("eps sum w", 1.0).at_most(1.0, largest_of_pse);
         }
     }
     Ok(())
@@ -76,7 +79,8 @@ fn symmetrized(n: usize, r: u32, seed: u64) -> Errors {
     let sums = |w: &DMatrix<f64>| u.component_mul(&(w * DVector::from_element(n * n, 1.0)));
     let conserving = &s * &u + sums(&s);
     // What conserves sums to zero: its pair terms are antisymmetric.
-    assert!(conserving.sum().abs() < 1e-12 * conserving.lp_norm(1));
+    let antisymmetric = Promise::new("Conservation", "symmetrized DC-PSE gradient, sum over sum of magnitudes");
+    antisymmetric.at_most(1e-12, conserving.sum().abs() / conserving.lp_norm(1));
     Errors { dcpse: rms(&w * &u - sums(&w)), conserving: rms(conserving), consistent: rms(&s * &u - sums(&s)) }
 }
 

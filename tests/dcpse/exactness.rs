@@ -2,7 +2,7 @@
 
 use parops::{
     Apply, BruteForce, CellList, Cutoff, D1, D2, DcPse, Domain, Epsilon, ErrorKind, Expression, Gradient, Laplacian,
-    MultiIndex, Neighbors, OperatorError, Particles, Rows, Sign, Stencil,
+    MultiIndex, Neighbors, OperatorError, Particles, Rows, Sign, Stencil, testing::Promise,
 };
 
 type Failure = Result<(), parops::Error>;
@@ -19,10 +19,13 @@ fn laplacian_of_a_polynomial_is_exact_on_a_scattered_set_to_its_edges() -> Failu
     // Residual times the values of f, in units of epsilon^-2.
     for (x, out) in particles.points().iter().zip(out) {
         let exact = 20.0 * x[0].powi(3) - 12.0 * x[0] * x[1] * x[1];
-        assert!((out - exact).abs() < 1e-8, "{out} against {exact}");
+        Promise::new("Residuals", "Laplacian of r = 4 of a polynomial of degree 5, to the edges")
+            .at_most(1e-8, (out - exact).abs());
     }
     let report = rows.report();
-    assert!(report.residual < 1e-12 && report.condition < 1e7, "{report:?}");
+    Promise::new("Residuals", "Laplacian of r = 4 of a polynomial of degree 5, residual reported")
+        .at_most(1e-12, report.residual);
+    assert!(report.condition < 1e7, "{report:?}");
     assert_eq!(report.rungs.iter().sum::<usize>(), 196);
     Ok(())
 }
@@ -48,7 +51,8 @@ fn lattice_weights_approach_finite_differences() -> Failure {
                 1 => -2.0 / 3.0,
                 _ => 1.0 / 12.0,
             };
-            assert!((w[0] - exact).abs() < miss, "{separation:?} {w:?} {exact}");
+            let limit = format!("lattice weights against finite differences, h/epsilon = {c}");
+            Promise::new("Orders", limit).at_most(miss, (w[0] - exact).abs());
         }
     }
     Ok(())

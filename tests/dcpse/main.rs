@@ -9,6 +9,7 @@ mod measure;
 #[path = "../../examples/orders/sets.rs"]
 mod sets;
 
+mod accuracy;
 mod catalogue;
 mod conservation;
 mod dimensions;

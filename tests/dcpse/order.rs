@@ -2,9 +2,10 @@
 //!
 //! How it is measured, and the bands, are those of the example `orders`.
 
+use crate::bands::Band;
 use crate::measure::{OfDegree, Series, observe};
 use crate::sets::Set;
-use parops::{Field, Laplacian, Operator};
+use parops::{Field, Laplacian, Operator, testing::Promise};
 
 /// Four grids, from coarse to fine.
 fn sides<const D: usize>() -> Vec<usize> {
@@ -21,6 +22,19 @@ fn holds<const D: usize, const K: usize, T: Field>(
         let Series { set, order, even, .. } = series;
         let name = format!("{D}D l {} output {k} r {order} {} even {even}", outcome.conditions, set.name());
         println!("{name}: {observed:.3?}, {} of {} rows grown", outcome.grown, outcome.rows);
+        let r = f64::from(*order);
+        for Band { what, low, high, value } in crate::bands::bands(series, D, observed) {
+            let dimensions = if D == 3 { " in 3D" } else { "" };
+            match what {
+                "L2" => Promise::new("Orders", format!("DC-PSE {D}D, r = {order}, L2 order")).within(low, high, value),
+                "face" => Promise::new("Orders", format!("DC-PSE, order at faces{dimensions} less r"))
+                    .at_least(low - r, value - r),
+                "L-inf" if low.is_finite() && high.is_finite() => {
+                    Promise::new("Orders", "DC-PSE, L-inf order less r").within(low - r, high - r, value - r);
+                }
+                _ => {}
+            }
+        }
         assert!(left.is_empty(), "{name}: {left:?}, {observed:?}");
     }
 }

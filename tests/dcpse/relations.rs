@@ -6,7 +6,7 @@
 use crate::cases::cases;
 use parops::{
     Apply, BruteForce, CellList, Cutoff, DcPse, Domain, Expression, Gradient, Laplacian, MultiIndex, Nearest,
-    Neighbors, Particles, Random, Row, Rows, Sign,
+    Neighbors, Particles, Random, Row, Rows, Sign, testing::Promise,
 };
 use proptest::prelude::*;
 
@@ -132,9 +132,13 @@ fn apply(rows: &Rows, f: &[f64]) -> Vec<f64> {
 }
 
 /// The rounding of a result, in units of eps times the absolute terms (verification figure for M7 and M8).
-const SUM: f64 = 8.0 * f64::EPSILON;
+const TERMS: f64 = 8.0;
 /// Changes of weights where positions are rounded (verification figures for M2, M4 and M5; M6 has twice that).
 const WEIGHTS: f64 = 16.0;
+
+fn relation(text: &'static str) -> Promise {
+    Promise::new("Metamorphic relations", text)
+}
 
 proptest! {
     #![proptest_config(config())]
@@ -145,7 +149,7 @@ proptest! {
         let t = t.map(|t| f64::from(t) / 1024.0);
         let moved = set.map(|x| [x[0] + t[0], x[1] + t[1]], 1.0);
         let (a, b) = (set.rows(choice), moved.rows(choice));
-        prop_assert!(same_bits(&a, &b, 1.0));
+        relation("M1 DC-PSE rows keep their bits under an exact translation").holds(same_bits(&a, &b, 1.0));
         prop_assert_eq!(a.report(), b.report());
     }
 
@@ -156,7 +160,7 @@ proptest! {
         let (a, b) = (set.rows(choice), moved.rows(choice));
         prop_assume!(same_neighbors(&a, &b));
         let shift = t[0].abs().max(t[1].abs()) * SIDE as f64;
-        prop_assert!(difference(&a, &b, 1.0) <= WEIGHTS * (1.0 + shift));
+        relation("M2 DC-PSE rows under a translation t").in_units("(1 + t/h) cond eps sum w", 1.0 + shift).at_most(WEIGHTS, difference(&a, &b, 1.0));
     }
 
     #[test]
@@ -165,7 +169,8 @@ proptest! {
         let scale = 2.0_f64.powi(k);
         let scaled = set.map(|x| x.map(|x| x * scale), scale);
         let (a, b) = (set.rows(choice), scaled.rows(choice));
-        prop_assert!(same_bits(&a, &b, 2.0_f64.powi(-k * choice.degree())));
+        let scaled = same_bits(&a, &b, 2.0_f64.powi(-k * choice.degree()));
+        relation("M3 DC-PSE rows keep their bits when all is scaled by 2^k").holds(scaled);
         let figures = |rows: &Rows| [rows.report().condition, rows.report().residual].map(f64::to_bits);
         prop_assert_eq!(figures(&a), figures(&b));
     }
@@ -176,7 +181,8 @@ proptest! {
         let scaled = set.map(|x| x.map(|x| x * scale), scale);
         let (a, b) = (set.rows(choice), scaled.rows(choice));
         prop_assume!(same_neighbors(&a, &b));
-        prop_assert!(difference(&a, &b, scale.powi(-choice.degree())) <= WEIGHTS);
+        let found = difference(&a, &b, scale.powi(-choice.degree()));
+        relation("M4 DC-PSE rows scaled by any factor").in_units("cond eps sum w", 1.0).at_most(WEIGHTS, found);
     }
 
     #[test]
@@ -185,11 +191,12 @@ proptest! {
         let rows = set.rows(choice);
         let reflected = set.map(|x| { let mut x = *x; x[axis] = -x[axis]; x }, 1.0).rows(choice);
         let sign = if choice.beta[axis] % 2 == 0 { 1.0 } else { -1.0 };
-        prop_assert!(difference(&rows, &reflected, sign) <= WEIGHTS);
+        let axes = relation("M5 DC-PSE rows with axes reflected or permuted").in_units("cond eps sum w", 1.0);
+        axes.at_most(WEIGHTS, difference(&rows, &reflected, sign));
         let [i, j] = choice.beta;
         let permuted = set.map(|x| [x[1], x[0]], 1.0).rows(Choice { beta: [j, i], ..choice });
         prop_assert!(same_neighbors(&rows, &permuted));
-        prop_assert!(difference(&rows, &permuted, 1.0) <= WEIGHTS);
+        axes.at_most(WEIGHTS, difference(&rows, &permuted, 1.0));
     }
 
     #[test]
@@ -200,7 +207,8 @@ proptest! {
         let laplacian = DcPse::<Laplacian<2>, 2>::new();
         let (a, b) = (laplacian.assemble(&set.provider()).unwrap(), laplacian.assemble(&turned.provider()).unwrap());
         prop_assume!(same_neighbors(&a, &b));
-        prop_assert!(difference(&a, &b, 1.0) <= 2.0 * WEIGHTS);
+        let turns = relation("M6 DC-PSE Laplacian rotated").in_units("cond eps sum w", 1.0);
+        turns.at_most(2.0 * WEIGHTS, difference(&a, &b, 1.0));
         let condition = a.report().condition;
         let gradient = DcPse::<Gradient<2>, 2>::new();
         let (a, b) = (gradient.assemble(&set.provider()).unwrap(), gradient.assemble(&turned.provider()).unwrap());
@@ -209,8 +217,9 @@ proptest! {
             let size: f64 = b.weights.iter().map(|w| w[0].abs() + w[1].abs()).sum();
             for (a, b) in a.weights.iter().zip(b.weights) {
                 let expected = [cos * a[0] - sin * a[1], sin * a[0] + cos * a[1]];
-                let limit = 2.0 * WEIGHTS * f64::EPSILON * condition * size;
-                prop_assert!((expected[0] - b[0]).abs() <= limit && (expected[1] - b[1]).abs() <= limit);
+                let turns = relation("M6 DC-PSE gradient turns with the points");
+                let turns = turns.in_units("cond eps sum w", f64::EPSILON * condition * size);
+                turns.at_most(2.0 * WEIGHTS, (expected[0] - b[0]).abs().max((expected[1] - b[1]).abs()));
             }
         }
     }
@@ -243,7 +252,8 @@ proptest! {
             prop_assert_eq!(a.diagonal[0].to_bits(), b.diagonal[0].to_bits());
         }
         let (f, g) = (apply(&a, &set.fields[0]), apply(&b, &renumbered.fields[0]));
-        prop_assert!(order.iter().zip(&g).all(|(&p, g)| f[p].to_bits() == g.to_bits()));
+        let same = order.iter().zip(&g).all(|(&p, g)| f[p].to_bits() == g.to_bits());
+        relation("M7 DC-PSE results keep their bits under renumbering, canonical").holds(same);
         let oracle = choice.method().assemble(&set.provider().canonical()).unwrap();
         prop_assert!(same_bits(&a, &oracle, 1.0));
     }
@@ -263,7 +273,8 @@ proptest! {
                 w[0].abs() * size(q as usize).max(size(p))
             }).sum();
             let terms = a.abs() * absolute(&rows, p, f) + b.abs() * absolute(&rows, p, g) + before;
-            prop_assert!((of_mixed[p] - (a * of_f[p] + b * of_g[p])).abs() <= SUM * terms);
+            let linear = relation("M8 DC-PSE rows are linear").in_units("eps sum abs", f64::EPSILON * terms);
+            linear.at_most(TERMS, (of_mixed[p] - (a * of_f[p] + b * of_g[p])).abs());
         }
     }
 
@@ -275,12 +286,14 @@ proptest! {
         let epsilon = set.cutoff / parops::CUTOFF_OVER_EPSILON;
         for out in apply(&rows, &[c; N]) {
             if choice.is_difference() {
-                prop_assert_eq!(out, 0.0);
+                relation("M9 DC-PSE derivative of a constant, difference form").at_most(0.0, out.abs());
             } else {
                 // '+' counts a constant twice; the value itself, degree 0, is reproduced.
                 let (exact, twice) = if choice.degree() == 0 { (c, 1.0) } else { (0.0, 2.0) };
-                let limit = 4.0 * 10.0 * f64::EPSILON * report.condition * twice * epsilon.powi(-choice.degree()) + SUM * report.sum_abs;
-                prop_assert!((out - exact).abs() <= limit * c.abs(), "{out:e}");
+                let scale = twice * epsilon.powi(-choice.degree());
+                let unit = f64::EPSILON * (10.0 * report.condition * scale + 0.25 * TERMS * report.sum_abs);
+                let sums = relation("M9 DC-PSE derivative of a constant, sum form").in_units("(l cond + 2 sum w) eps", unit * c.abs());
+                sums.at_most(4.0, (out - exact).abs());
             }
         }
     }
@@ -295,7 +308,35 @@ proptest! {
         let rows = set.rows(choice);
         let places = Part { provider: wider.provider(), first: 0, targets: N };
         let with: Rows = choice.method().assemble(&places).unwrap();
-        prop_assert!(same_bits(&rows, &with, 1.0));
+        relation("M10 DC-PSE rows keep their bits with particles beyond the cutoff").holds(same_bits(&rows, &with, 1.0));
+    }
+
+    #[test]
+    fn m11_periodic_shifts_leave_every_bit_and_tiles_every_value(seed: u64, choice in choice(), shift in [-3..=3_i32, -3..=3]) {
+        const SIDE: usize = 10;
+        let jittered = Particles::<2>::jittered([0.0; 2], [1.0; 2], [SIDE; 2], 0.3, seed).unwrap();
+        let points: Vec<[f64; 2]> =
+            jittered.points().iter().map(|x| x.map(|x| (x * 1048576.0).floor() / 1048576.0)).collect();
+        let moved = |by: [f64; 2]| points.iter().map(move |x| [x[0] + by[0], x[1] + by[1]]);
+        let build = |points: Vec<[f64; 2]>, width: f64| {
+            let torus = Domain::periodic([0.0; 2], [width; 2]).unwrap();
+            let cells = CellList::build(&Particles::new(points).unwrap(), &torus, Cutoff(0.42)).unwrap().canonical();
+            choice.method().assemble(&cells).unwrap()
+        };
+        let rows = build(points.clone(), 1.0);
+        let shifted = build(moved(shift.map(f64::from)).collect(), 1.0);
+        relation("M11 DC-PSE rows keep their bits in a box shifted by its length").holds(same_bits(&rows, &shifted, 1.0));
+
+        let tiles = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]];
+        let tiled = build(tiles.into_iter().flat_map(moved).collect(), 2.0);
+        let mut random = Random::new(seed);
+        let f: Vec<f64> = (0..SIDE * SIDE).map(|_| random.normal()).collect();
+        let (a, b) = (apply(&rows, &f), apply(&tiled, &f.repeat(4)));
+        for p in 0..4 * f.len() {
+            let of_tile = relation("M11 DC-PSE results on a box tiled 2^D times");
+            let of_tile = of_tile.in_units("eps sum abs", f64::EPSILON * absolute(&rows, p % f.len(), &f));
+            of_tile.at_most(TERMS, (a[p % f.len()] - b[p]).abs());
+        }
     }
 
     #[test]
@@ -307,10 +348,9 @@ proptest! {
         let kept = rows.clone();
         let f = set.fields[0].clone();
         let first = apply(&rows, &f);
-        prop_assert_eq!(apply(&rows, &f), first);
-        prop_assert_eq!(&f, &set.fields[0]);
-        prop_assert_eq!(&rows, &kept);
-        prop_assert_eq!(particles.points(), &set.points[..]);
+        let again = apply(&rows, &f) == first;
+        let unchanged = again && f == set.fields[0] && rows == kept && particles.points() == &set.points[..];
+        relation("M12 DC-PSE inputs are unchanged by every call").holds(unchanged);
         prop_assert_eq!(&choice.method().assemble(&provider).unwrap(), &kept);
     }
 }

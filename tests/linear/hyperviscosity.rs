@@ -3,7 +3,7 @@
 use crate::dense;
 use parops::{
     Along, Apply, DcPse, Domain, ErrorKind, Hyperviscosity, Laplacian, LinearError, Nearest, OperatorError, Particles,
-    Plan, Random, Rk4, Rows, Sign, Spacing, SpectrumEstimator, Tuning, integrate,
+    Plan, Random, Rk4, Rows, Sign, Spacing, SpectrumEstimator, Tuning, integrate, testing::Promise,
 };
 
 const VELOCITY: [f64; 2] = [0.8, -0.6];
@@ -86,7 +86,8 @@ fn tuned_hyperviscosity_bounds_what_grows_without_it() {
             rows.apply(u, du)?;
             damping.add(&velocities, u, du)
         }));
-        assert!(right * h.0 <= 1e-3, "{order} {right}");
+        let growth = Promise::new("Limits of steps", "growth left by tuned hyperviscosity, of the whole spectrum");
+        growth.in_units("v/h", 1.0 / h.0).at_most(1e-3, right);
 
         // Its share of the step limit.
         let radius = estimator.of(&lap).unwrap().radius;
@@ -160,7 +161,8 @@ fn orders_of_advection_are_kept() {
         let observed = (error(coarse, order, gamma) / error(fine, order, gamma)).log2();
         // The added error is of the next odd order, 2 k - 1 = r + 1, so that it may be seen on the way to r.
         let r = f64::from(order);
-        assert!((r - 0.1..=r + 1.1).contains(&observed), "{order} {observed}");
+        let promise = Promise::new("Orders", format!("hyperviscosity keeps the order, r = {r}"));
+        promise.within(r - 0.1, r + 1.1, observed);
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::cases::cases;
 use parops::{
     ApplyError, Centering, Cic, Domain, Error, Face, Lambda, Mesh, MeshError, MeshKernel, Ngp, ParticleError, Random,
-    Result, Tsc, Volumes,
+    Result, Tsc, Volumes, testing::Promise,
 };
 use proptest::prelude::*;
 
@@ -89,10 +89,9 @@ fn depositing_conserves_all_moments_the_kernel_promises() {
                 nodes.nodes().map(term).sum::<f64>()
             };
             let size: f64 = strengths.iter().zip(&points).map(each).sum();
-            assert!(
-                (before - after).abs() <= 64.0 * f64::EPSILON * size,
-                "{name}, {D}D, {centering:?}, moment {exponents:?}: {before} became {after}"
-            );
+            let _ = name;
+            let moments = Promise::new("Conservation", "moments to the exactness under deposition, every kernel");
+            moments.in_units("eps sum abs", f64::EPSILON * size).at_most(64.0, (before - after).abs());
         }
     }
     for centering in [Centering::Nodes, Centering::Cells] {
@@ -118,10 +117,8 @@ fn gathering_reproduces_polynomials_and_the_next_degree_not() {
                 let stencil = mesh.stencil(kernel, x).unwrap();
                 let size: f64 = stencil.nodes().map(|(node, w)| w.abs() * size(&nodes[node], exponents)).sum();
                 let error = (out - power(x, exponents)).abs();
-                assert!(
-                    error <= 64.0 * f64::EPSILON * size,
-                    "{name}, {D}D, {centering:?}, {exponents:?} at {x:?}: {error:e}"
-                );
+                let exact = Promise::new("Conservation", "polynomials to the exactness come back by gathering");
+                exact.in_units("eps sum abs", f64::EPSILON * size).at_most(64.0, error);
             }
         }
         let next: [u32; D] = std::array::from_fn(|axis| if axis == 0 { kernel.exactness() + 1 } else { 0 });
@@ -269,10 +266,13 @@ proptest! {
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let (total, size): (f64, f64) = (omega.iter().sum(), omega.iter().map(|omega| omega.abs()).sum());
         // 15 particles of up to 36 nodes, whose magnitudes add up to 1.39^2 of each.
-        let tolerance = 64.0 * 1.39 * 1.39 * f64::EPSILON * size;
-        prop_assert!((values.iter().sum::<f64>() - total).abs() <= tolerance);
+        const ROUNDING: f64 = 64.0 * 1.39 * 1.39;
+        let sums = |text| Promise::new("Conservation", text);
+        let deposited = (values.iter().sum::<f64>() - total).abs();
+        sums("total under deposition on any torus").in_units("eps sum abs", f64::EPSILON * size).at_most(ROUNDING, deposited);
         let largest = u.iter().fold(0.0, |largest: f64, u| largest.max(u.abs()));
-        prop_assert!((dot(&values, &u) - dot(&omega, &out)).abs() <= tolerance * largest);
+        let apart = (dot(&values, &u) - dot(&omega, &out)).abs();
+        sums("deposition and gathering are adjoint").in_units("eps sum abs max u", f64::EPSILON * size * largest).at_most(ROUNDING, apart);
     }
 
     #[test]
@@ -299,7 +299,8 @@ proptest! {
         mesh.deposit(&kernel, &moved, &omega, &mut there).unwrap();
         for (i, j) in (0..64).map(|node| (node / 8, node % 8)) {
             let to = 8 * ((i + by[0]) % 8) + (j + by[1]) % 8;
-            prop_assert_eq!(here[8 * i + j].to_bits(), there[to].to_bits());
+            let shifted = Promise::new("Metamorphic relations", "M11 deposition shifted by whole cells keeps its bits");
+            shifted.equal(&here[8 * i + j].to_bits(), &there[to].to_bits());
         }
     }
 }
@@ -583,7 +584,8 @@ fn bits() -> Vec<u64> {
 #[test]
 fn the_bits_are_those_of_every_build() {
     let hash = bits().iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, bits| (hash ^ bits).wrapping_mul(0x0100_0000_01b3));
-    assert_eq!(hash, 0x1faf_f4ef_a58b_a191, "{hash:#x}");
+    let everywhere = Promise::new("Reproducibility", "hash of deposited and gathered bits, every build and machine");
+    everywhere.equal(&hash, &0x1faf_f4ef_a58b_a191);
 }
 
 #[cfg(feature = "rayon")]
@@ -601,7 +603,8 @@ fn any_number_of_threads_deposits_the_same_bits_and_names_the_same_particle() {
     assert_eq!(one.1.particle(), Some(9000));
     for threads in [2, 3, 8] {
         for _ in 0..2 {
-            assert!(with(threads) == one, "{threads} threads");
+            let same = Promise::new("Reproducibility", "deposition, gathering and errors, bits on 1, 2, 3, 8 threads");
+            same.holds(with(threads) == one);
         }
     }
 }

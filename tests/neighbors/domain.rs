@@ -3,6 +3,7 @@
 use crate::cases::cases;
 use parops::{
     BruteForce, CellList, Cutoff, Domain, DomainError, Error, Face, LENGTH_HIGH, LENGTH_LOW, Neighbors, Particles,
+    testing::Promise,
 };
 use proptest::prelude::*;
 
@@ -113,7 +114,8 @@ fn particles_one_ulp_around_a_periodic_face_meet_across_it() {
     let ring = Domain::periodic([0.0], [1.0]).unwrap();
     let cells = CellList::build(&particles, &ring, Cutoff(0.25)).unwrap();
     for p in 0..points.len() {
-        assert_eq!(cells.count(p, 4.0 * f64::EPSILON), points.len() - 1, "particle {p}");
+        let meet = Promise::new("Neighbor lists", "particles one ulp around a periodic face meet across it");
+        meet.equal(&cells.count(p, 4.0 * f64::EPSILON), &(points.len() - 1));
     }
 }
 
@@ -137,7 +139,7 @@ proptest! {
             x = if ulps > 0 { x.next_up() } else { x.next_down() };
         }
         let [wrapped] = domain.wrap(&[x]).unwrap();
-        prop_assert!(lower <= wrapped && wrapped < upper, "{x:e} to {wrapped:e}");
+        Promise::new("Neighbor lists", "wrapped coordinates lie in the half-open box").holds(lower <= wrapped && wrapped < upper);
         prop_assert_eq!(domain.wrap(&[wrapped]), Ok([wrapped]));
         // Up to rounding of the sums above and in the wrap, each of at most 4 times the largest number.
         let tolerance = 16.0 * f64::EPSILON * (lower.abs() + 4.0 * width);

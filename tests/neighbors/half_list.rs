@@ -4,7 +4,7 @@ use crate::cases::cases;
 use parops::{
     Allowance, Apply, BruteForce, CellList, Cutoff, D1, D2, Domain, Epsilon, Error, Exchange, Face, Form, Gradient,
     HalfList, Kernel, Laplacian, MultiIndex, Nearest, Neighbor, NeighborError, NeighborList, Neighbors, OperatorError,
-    Particles, Pse, Random, Result, Sign, SymmetricPse, Symmetry, Term, VerletList, Volumes,
+    Particles, Pse, Random, Result, Sign, SymmetricPse, Symmetry, Term, VerletList, Volumes, testing::Promise,
 };
 use proptest::prelude::*;
 
@@ -79,7 +79,8 @@ fn stands_for_full_rows<const D: usize>(kinds: [usize; 3], shape: usize, n: usiz
             HalfList::from_provider(&(&cells).canonical(), Cutoff(cutoff)).unwrap(),
         ];
         for half in &halves {
-            assert_eq!(unfolded(half), expected);
+            Promise::new("Neighbor lists", "half lists unfolded against brute force, every provider")
+                .equal(&unfolded(half), &expected);
             let total: usize = expected.iter().map(Vec::len).sum();
             assert_eq!(2 * half.mutual() + half.single(), total);
             if kinds[..D].iter().all(|&kind| [0, 1, 6].contains(&kind)) {
@@ -130,7 +131,9 @@ fn half_list_equals_brute_force_after_a_hundred_random_updates() {
             particles.set_points(&points).unwrap();
             verlet.update(&particles).unwrap();
             let half = HalfList::from_provider(&verlet, Cutoff(0.2)).unwrap();
-            assert_eq!(unfolded(&half), rows(&BruteForce::build(&particles, &domain, Cutoff(0.2)).unwrap(), 0.2));
+            let expected = rows(&BruteForce::build(&particles, &domain, Cutoff(0.2)).unwrap(), 0.2);
+            Promise::new("Neighbor lists", "half lists of a Verlet list after 100 updates")
+                .equal(&unfolded(&half), &expected);
             assert_eq!(half.validate(particles.generation()), Ok(()));
         }
         assert!(verlet.rebuilds() > 0 && verlet.rebuilds() < 60);
@@ -182,7 +185,8 @@ fn sums_of_pairs<const D: usize>(kinds: [usize; 3], shape: usize, n: usize, seed
         });
         for k in 0..2 {
             let apart = (out[k] - expected[k]).abs();
-            assert!(apart <= AGREES * f64::EPSILON * size[k], "particle {p}: {apart:e} {:e}", size[k]);
+            let promise = Promise::new("Conservation", "sums over pairs against full rows");
+            promise.in_units("eps sum abs", f64::EPSILON * size[k]).at_most(AGREES, apart);
         }
         sizes += size[0];
     }
@@ -193,7 +197,8 @@ fn sums_of_pairs<const D: usize>(kinds: [usize; 3], shape: usize, n: usize, seed
     });
     // What flows through mirrors is left.
     let left = exact_sum(out.iter().flat_map(|out| [out[0], -1.0]).chain(images));
-    assert!(left.abs() <= CONSERVES * f64::EPSILON * sizes, "{left:e} {sizes:e}");
+    let conserved = Promise::new("Conservation", "antisymmetric sums over pairs, total less what mirrors take");
+    conserved.in_units("eps sum abs", f64::EPSILON * sizes).at_most(CONSERVES, left.abs());
 }
 
 /// What is known of one comparison, in eps of T times the sum of the absolute pair terms.
@@ -290,9 +295,10 @@ fn conserves<const D: usize>(m: usize, wide: f64) -> Result<()> {
 
 fn check(found: [Apart; 2], conserved: bool) {
     for apart in found {
-        assert!(apart.most <= AGREES, "{apart:?}");
+        let promise = |text| Promise::new("Conservation", text).in_units("eps sum abs", 1.0);
+        promise("PSE over a half list against the full gather, f64 and f32").at_most(AGREES, apart.most);
         if conserved {
-            assert!(apart.sum <= CONSERVES, "{apart:?}");
+            promise("PSE over a half list, total, f64 and f32").at_most(CONSERVES, apart.sum);
         } else {
             assert!(apart.sum > 1e3, "'-' with an odd degree does not conserve: {apart:?}");
         }

@@ -1,7 +1,7 @@
 //! The provider of nearest neighbors: a provider like any other, whole shells, whatever the spacing.
 
 use crate::cases::cases;
-use parops::testing::{check_provider, check_provider_against};
+use parops::testing::{Promise, check_provider, check_provider_against};
 use parops::{BruteForce, CellList, Cutoff, DcPse, Domain, Face, Laplacian, Nearest, Neighbors, Particles, Random};
 use proptest::prelude::*;
 
@@ -27,7 +27,9 @@ fn rows_are_those_of_the_oracle_on_even_graded_and_closed_sets() {
         let nearest = Nearest::build(&particles, &domain, 12).unwrap();
         let oracle = BruteForce::build(&particles, &domain, Cutoff(nearest.reach())).unwrap();
         assert_eq!(check_provider(&nearest), Ok(()));
-        assert_eq!(check_provider_against(&nearest, &oracle), Ok(()));
+        let found = check_provider_against(&nearest, &oracle);
+        Promise::new("Neighbor lists", "nearest neighbors against brute force: even, graded and closed sets")
+            .equal(&found, &Ok(()));
         for p in 0..particles.len() {
             let cutoff = nearest.cutoff(p);
             assert!(nearest.count(p, cutoff) >= 12 && oracle.count(p, cutoff * (1.0 - 2e-9)) < 12);
@@ -92,7 +94,8 @@ proptest! {
             if let Some(&last) = distances.get(k - 1) {
                 let cutoff = nearest.cutoff(p);
                 // A cutoff is widened by 1e-9 for rounding.
-                prop_assert!(cutoff >= last && cutoff <= last * (1.0 + 2e-9), "{cutoff:e} {last:e}");
+                let promise = Promise::new("Neighbor lists", "cutoff of the nearest over the distance of number k, less 1");
+                promise.within(0.0, 2e-9, if cutoff >= last { (cutoff - last) / last.max(f64::MIN_POSITIVE) } else { f64::NAN });
             }
         }
     }

@@ -3,7 +3,7 @@
 use crate::cases::cases;
 use parops::{
     BruteForce, CellList, Cutoff, Domain, Error, Face, LENGTH_HIGH, LENGTH_LOW, Neighbor, NeighborError, NeighborList,
-    Neighbors, ParticleError, Particles, Random, Stencil,
+    Neighbors, ParticleError, Particles, Random, Stencil, testing::Promise,
 };
 use proptest::prelude::*;
 
@@ -20,13 +20,22 @@ fn row<P: Neighbors<D>, const D: usize>(provider: &P, p: usize, cutoff: f64) -> 
     row
 }
 
-fn assert_same_rows<const D: usize>(a: &impl Neighbors<D>, b: &impl Neighbors<D>, cutoff: f64) {
+fn agree(text: &'static str) -> Promise {
+    Promise::new("Neighbor lists", text)
+}
+
+/// The targets whose rows differ, as sets.
+fn differing<const D: usize>(a: &impl Neighbors<D>, b: &impl Neighbors<D>, cutoff: f64) -> Vec<usize> {
     assert_eq!((a.targets(), a.sources()), (b.targets(), b.sources()));
-    for p in 0..a.targets() {
-        assert_eq!(a.center(p), b.center(p));
-        assert_eq!(row(a, p, cutoff), row(b, p, cutoff), "target {p}");
-        assert_eq!(a.count(p, cutoff), row(b, p, cutoff).len(), "target {p}");
-    }
+    let differs = |&p: &usize| {
+        let (of_a, of_b) = (row(a, p, cutoff), row(b, p, cutoff));
+        a.center(p) != b.center(p) || of_a != of_b || a.count(p, cutoff) != of_b.len()
+    };
+    (0..a.targets()).filter(differs).collect()
+}
+
+fn assert_same_rows<const D: usize>(a: &impl Neighbors<D>, b: &impl Neighbors<D>, cutoff: f64) {
+    assert_eq!(differing(a, b, cutoff), [0; 0]);
 }
 
 const AXES: [[Face; 2]; 9] = [
@@ -76,13 +85,14 @@ fn cell_list_equals_oracle<const D: usize>(kinds: [usize; 3], shape: usize, n: u
     let domain = domain::<D>(kinds);
     let oracle = BruteForce::build(&particles, &domain, Cutoff(cutoff)).unwrap();
     let cells = CellList::build(&particles, &domain, Cutoff(cutoff)).unwrap();
+    let same = agree("cell list against brute force: any faces, ties, clusters, rows as sets to the bit");
     for query in [cutoff, 0.7 * cutoff] {
-        assert_same_rows(&oracle, &cells, query);
+        same.equal(&differing(&oracle, &cells, query)[..], &[]);
     }
     let targets = shaped::<D>(shape, 20, cutoff, seed ^ 1);
     let oracle = BruteForce::build_at(&targets, &particles, &domain, Cutoff(cutoff)).unwrap();
     let cells = CellList::build_at(&targets, &particles, &domain, Cutoff(cutoff)).unwrap();
-    assert_same_rows(&oracle, &cells, cutoff);
+    same.equal(&differing(&oracle, &cells, cutoff)[..], &[]);
 }
 
 proptest! {
@@ -147,7 +157,8 @@ fn brute_force_equals_explicit_copies_of_the_box() {
         let mut expected = row(&tiled, p, cutoff);
         expected.iter_mut().for_each(|neighbor| neighbor.0 %= points.len());
         expected.sort_unstable();
-        assert_eq!(row(&own, p, cutoff), expected, "target {p}");
+        agree("M11 rows of brute force on a torus are those among copies of the box")
+            .equal(&row(&own, p, cutoff), &expected);
     }
 }
 
@@ -167,7 +178,7 @@ fn rows_of_a_torus_tiled_twice_are_the_same_rows() {
         let mut found = row(&large, p, 0.5);
         found.iter_mut().for_each(|neighbor| neighbor.0 %= points.len());
         found.sort_unstable();
-        assert_eq!(found, row(&small, p % points.len(), 0.5), "target {p}");
+        agree("M11 rows of a torus tiled twice").equal(&found, &row(&small, p % points.len(), 0.5));
     }
 }
 
@@ -192,7 +203,8 @@ fn particles_beyond_the_cutoff_do_not_touch_a_row() {
         let mut all = near.clone();
         all.extend((0..30).map(|_| [1.5 + scale * random.uniform(), -0.5 - scale * random.uniform()]));
         let joined = build(all);
-        (0..near.len()).for_each(|p| assert_eq!(row(&joined, p, 0.25), row(&alone, p, 0.25), "target {p}"));
+        let untouched = agree("M10 rows with particles beyond the cutoff");
+        (0..near.len()).for_each(|p| untouched.equal(&row(&joined, p, 0.25), &row(&alone, p, 0.25)));
     }
 }
 
@@ -283,7 +295,7 @@ fn neighbors_at_exactly_the_cutoff_are_in_for_every_provider() {
     for (cutoff, count) in [(0.25, 32), (0.25_f64.next_down(), 26), (0.125, 6), (0.125_f64.next_down(), 0)] {
         for p in [0, 77, 511] {
             let counts = (cells.count(p, cutoff), oracle.count(p, cutoff), list.count(p, cutoff));
-            assert_eq!(counts, (count, count, count), "target {p}, cutoff {cutoff:e}");
+            agree("counts at the cutoff and one ulp below, every provider").equal(&counts, &(count, count, count));
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::cases::cases;
 use parops::{
     Allowance, Apply, BruteForce, CellList, Cutoff, Domain, Epsilon, Exchange, Expression, Gradient, HighOrderGaussian,
     Kernel, Laplacian, MultiIndex, Neighbors, Particles, Pse, Random, Row, Rows, Sign, SmoothingKernel, Sph, SphForm,
-    Term, Volumes,
+    Term, Volumes, testing::Promise,
 };
 use proptest::prelude::*;
 
@@ -183,7 +183,16 @@ fn apply(rows: &Rows, f: &[f64]) -> Vec<f64> {
 }
 
 /// The rounding of a result, in units of eps times the absolute terms (verification figure for M7, M8 and M11).
-const SUM: f64 = 8.0 * f64::EPSILON;
+const TERMS: f64 = 8.0;
+
+fn relation(text: &'static str) -> Promise {
+    Promise::new("Metamorphic relations", text)
+}
+
+/// A relation in units of what roundings of positions may do to a weight.
+fn rounding(text: &'static str, size: f64) -> Promise {
+    relation(text).in_units("steepness eps", size)
+}
 
 proptest! {
     #![proptest_config(config())]
@@ -194,7 +203,7 @@ proptest! {
         let t = t.map(|t| f64::from(t) / 1024.0);
         let moved = set.map(|x| [x[0] + t[0], x[1] + t[1]], 1.0);
         let (a, b) = (set.rows(choice), moved.rows(choice));
-        prop_assert!(same_bits(&a, &b, 1.0));
+        relation("M1 PSE and SPH rows keep their bits under an exact translation").holds(same_bits(&a, &b, 1.0));
         prop_assert_eq!(a.report(), b.report());
     }
 
@@ -203,7 +212,8 @@ proptest! {
         let set = Set::new(seed);
         let moved = set.map(|x| [x[0] + t[0], x[1] + t[1]], 1.0);
         let magnitude = 1.0 + t[0].abs().max(t[1].abs());
-        prop_assert!(difference(&set.rows(choice), &moved.rows(choice), 1.0) <= set.bound(choice, magnitude));
+        let found = difference(&set.rows(choice), &moved.rows(choice), 1.0);
+        rounding("M2 PSE and SPH rows under a translation", set.bound(choice, magnitude)).at_most(1.0, found);
     }
 
     #[test]
@@ -212,7 +222,8 @@ proptest! {
         let scale = 2.0_f64.powi(k);
         let scaled = set.map(|x| x.map(|x| x * scale), scale);
         let (a, b) = (set.rows(choice), scaled.rows(choice));
-        prop_assert!(same_bits(&a, &b, 2.0_f64.powi(-k * choice.degree())));
+        let scaled = same_bits(&a, &b, 2.0_f64.powi(-k * choice.degree()));
+        relation("M3 PSE and SPH rows keep their bits when all is scaled by 2^k").holds(scaled);
         prop_assert_eq!(a.report().moment_defect.to_bits(), b.report().moment_defect.to_bits());
     }
 
@@ -222,7 +233,7 @@ proptest! {
         let scaled = set.map(|x| x.map(|x| x * scale), scale);
         let factor: f64 = scale.powi(-choice.degree());
         let found = difference(&set.rows(choice), &scaled.rows(choice), factor);
-        prop_assert!(found <= factor * set.bound(choice, 1.0));
+        rounding("M4 PSE and SPH rows scaled by any factor", factor * set.bound(choice, 1.0)).at_most(1.0, found);
     }
 
     #[test]
@@ -231,10 +242,11 @@ proptest! {
         let rows = set.rows(choice);
         let reflected = set.map(|x| { let mut x = *x; x[axis] = -x[axis]; x }, 1.0).rows(choice);
         let sign = if choice.beta[axis] % 2 == 0 { 1.0 } else { -1.0 };
-        prop_assert!(difference(&rows, &reflected, sign) <= set.bound(choice, 1.0));
+        let axes = rounding("M5 PSE and SPH rows with axes reflected or permuted", set.bound(choice, 1.0));
+        axes.at_most(1.0, difference(&rows, &reflected, sign));
         let [i, j] = choice.beta;
         let permuted = set.map(|x| [x[1], x[0]], 1.0).rows(Choice { beta: [j, i], ..choice });
-        prop_assert!(difference(&rows, &permuted, 1.0) <= set.bound(choice, 1.0));
+        axes.at_most(1.0, difference(&rows, &permuted, 1.0));
     }
 
     #[test]
@@ -255,13 +267,15 @@ proptest! {
         let ((laplacian, gradient), (turned_laplacian, turned_gradient)) = (build(&set), build(&turned));
         // A rotated coordinate is rounded in two products and a sum, each of magnitude below 2.
         let bound = |beta| 2.0 * set.bound(Choice { sph: false, second: false, beta, order }, 4.0);
-        prop_assert!(difference(&laplacian, &turned_laplacian, 1.0) <= bound([2, 0]) + bound([0, 2]));
+        let found = difference(&laplacian, &turned_laplacian, 1.0);
+        rounding("M6 PSE Laplacian rotated", bound([2, 0]) + bound([0, 2])).at_most(1.0, found);
         let limit = bound([1, 0]) + bound([0, 1]);
         for p in 0..N {
             let (a, b) = (gradient.row(p).unwrap(), turned_gradient.row(p).unwrap());
             for (a, b) in a.weights.iter().zip(b.weights) {
                 let expected = [cos * a[0] - sin * a[1], sin * a[0] + cos * a[1]];
-                prop_assert!((expected[0] - b[0]).abs() <= limit && (expected[1] - b[1]).abs() <= limit);
+                let found = (expected[0] - b[0]).abs().max((expected[1] - b[1]).abs());
+                rounding("M6 PSE gradient turns with the points", limit).at_most(1.0, found);
             }
         }
     }
@@ -285,8 +299,9 @@ proptest! {
         let (a, b) = (apply(&rows, &set.fields[0]), apply(&renumbered.rows(choice), &renumbered.fields[0]));
         for (i, &p) in order.iter().enumerate() {
             // A diagonal is itself a sum, of all absolute weights at most.
-            let bound = SUM * (absolute(&rows, p, &set.fields[0]) + rows.report().sum_abs * set.fields[0][p].abs());
-            prop_assert!((a[p] - b[i]).abs() <= bound);
+            let terms = absolute(&rows, p, &set.fields[0]) + rows.report().sum_abs * set.fields[0][p].abs();
+            let renumbered = relation("M7 PSE and SPH results under renumbering").in_units("eps sum abs", f64::EPSILON * terms);
+            renumbered.at_most(TERMS, (a[p] - b[i]).abs());
         }
         let canonical = |set: &Set| {
             let particles = set.particles();
@@ -294,7 +309,8 @@ proptest! {
             apply(&choice.rows(&cells, set.epsilon, particles.volumes().unwrap()), &set.fields[0])
         };
         let (a, b) = (canonical(&set), canonical(&renumbered));
-        prop_assert!(order.iter().zip(&b).all(|(&p, b)| a[p].to_bits() == b.to_bits()));
+        let same = order.iter().zip(&b).all(|(&p, b)| a[p].to_bits() == b.to_bits());
+        relation("M7 PSE and SPH results keep their bits under renumbering, canonical").holds(same);
     }
 
     #[test]
@@ -311,7 +327,8 @@ proptest! {
                 w[0].abs() * (a * f[q as usize]).abs().max((b * g[q as usize]).abs()).max((a * f[p]).abs()).max((b * g[p]).abs())
             }).sum();
             let terms = a.abs() * absolute(&rows, p, f) + b.abs() * absolute(&rows, p, g) + before;
-            prop_assert!((of_mixed[p] - (a * of_f[p] + b * of_g[p])).abs() <= SUM * terms);
+            let linear = relation("M8 PSE and SPH rows are linear").in_units("eps sum abs", f64::EPSILON * terms);
+            linear.at_most(TERMS, (of_mixed[p] - (a * of_f[p] + b * of_g[p])).abs());
         }
     }
 
@@ -321,9 +338,10 @@ proptest! {
         let out = apply(&rows, &[c; N]);
         for (p, out) in out.into_iter().enumerate() {
             if choice.is_difference() {
-                prop_assert_eq!(out, 0.0);
+                relation("M9 PSE and SPH derivative of a constant, difference form").at_most(0.0, out.abs());
             } else {
-                prop_assert_eq!(out, row(&rows, p).diagonal[0] * c);
+                let diagonal = row(&rows, p).diagonal[0] * c;
+                relation("M9 PSE and SPH sum form of a constant is the diagonal").at_most(0.0, (out - diagonal).abs());
             }
         }
     }
@@ -338,7 +356,8 @@ proptest! {
             larger.points.push([4.5 + random.uniform(), -5.0 * random.uniform()]);
             larger.volumes.push(0.01);
         }
-        prop_assert!(same_bits(&set.rows(choice), &larger.rows(choice), 1.0));
+        let same = same_bits(&set.rows(choice), &larger.rows(choice), 1.0);
+        relation("M10 PSE and SPH rows keep their bits with particles beyond the cutoff").holds(same);
     }
 
     #[test]
@@ -352,7 +371,8 @@ proptest! {
         };
         let rows = build(&set, 1.0, choice);
         let shifted = set.map(|x| [x[0] + f64::from(shift[0]), x[1] + f64::from(shift[1])], 1.0);
-        prop_assert!(same_bits(&rows, &build(&shifted, 1.0, choice), 1.0));
+        let same = same_bits(&rows, &build(&shifted, 1.0, choice), 1.0);
+        relation("M11 PSE and SPH rows keep their bits in a box shifted by its length").holds(same);
 
         let copy = |tile: usize| set.points.iter().map(move |x| [x[0] + (tile % 2) as f64, x[1] + (tile / 2) as f64]);
         let tiled = Set {
@@ -363,8 +383,9 @@ proptest! {
         };
         let (a, b) = (apply(&rows, &set.fields[0]), apply(&build(&tiled, 2.0, choice), &tiled.fields[0]));
         for p in 0..N {
-            let bound = SUM * (absolute(&rows, p, &set.fields[0]) + rows.report().sum_abs * set.fields[0][p].abs());
-            prop_assert!((0..4).all(|tile| (a[p] - b[tile * N + p]).abs() <= bound));
+            let terms = absolute(&rows, p, &set.fields[0]) + rows.report().sum_abs * set.fields[0][p].abs();
+            let tiles = relation("M11 PSE and SPH results on a box tiled 2^D times").in_units("eps sum abs", f64::EPSILON * terms);
+            (0..4).for_each(|tile| tiles.at_most(TERMS, (a[p] - b[tile * N + p]).abs()));
         }
     }
 
@@ -378,11 +399,10 @@ proptest! {
         let f = set.fields[0].clone();
         let first = apply(&rows, &f);
         prop_assert_eq!(apply(&rows, &f), first, "an application leaves nothing behind");
-        prop_assert_eq!(&f, &set.fields[0]);
-        prop_assert_eq!(&rows, &kept);
-        prop_assert_eq!(particles.points(), &set.points[..]);
+        let unchanged = f == set.fields[0] && rows == kept && particles.points() == &set.points[..];
         let volumes: Vec<f64> = (0..N).map(|p| particles.volumes().unwrap().get(p).unwrap()).collect();
-        prop_assert_eq!(&volumes, &set.volumes);
+        let unchanged = unchanged && volumes == set.volumes;
+        relation("M12 PSE and SPH inputs are unchanged by every call").holds(unchanged);
         let again = choice.rows(&provider, set.epsilon, particles.volumes().unwrap());
         prop_assert_eq!(&again, &kept, "the provider gives the same rows again");
     }

@@ -6,7 +6,7 @@ use approx::{assert_abs_diff_eq, assert_relative_eq};
 use parops::{
     Allowance, Apply, BruteForce, CellList, Cutoff, D2, Domain, Epsilon, ErrorKind, Exchange, Expression, Face, Form,
     Gradient, Laplacian, LatticeSpectrum, MultiIndex, NeighborError, Neighbors, OperatorError, ParticleError,
-    Particles, Pse, Random, Rows, Sign, Volumes, WideGaussian,
+    Particles, Pse, Random, Rows, Sign, Volumes, WideGaussian, testing::Promise,
 };
 
 type Failure = Result<(), parops::Error>;
@@ -79,8 +79,9 @@ fn pse_converges_with_its_design_order_on_lattices() {
             TAU.powi(3) * (TAU * x[0]).sin() * (TAU * x[1]).sin()
         });
         for (name, observed) in [("laplacian", laplacian), ("d11", mixed), ("d10", first), ("d21", third)] {
-            let off = observed - f64::from(order);
-            assert!(off.abs() < 0.2, "{name}, r = {order}: observed {observed}");
+            let r = f64::from(order);
+            let promise = Promise::new("Orders", format!("PSE on lattices, {name}, r = {order}"));
+            promise.within(r - 0.2, r + 0.2, observed);
         }
     }
 }
@@ -102,7 +103,8 @@ fn wide_gaussian_has_the_leading_error_of_its_fourth_moment() {
     let p = n / 5;
     let error = out[p] + TAU * TAU * f[p];
     let predicted = 0.5 * epsilon * epsilon * TAU.powi(4) * f[p];
-    assert_relative_eq!(error, predicted, max_relative = 0.02);
+    let leading = Promise::new("Orders", "leading error of the wide Gaussian over its prediction");
+    leading.within(0.98, 1.02, error / predicted);
 }
 
 #[test]
@@ -196,7 +198,8 @@ fn strength_form_conserves_on_unequal_volumes() -> Failure {
                 pairs + (row.diagonal[0] * strengths[p]).abs()
             })
             .sum();
-        assert!(sum.abs() <= 4.0 * f64::EPSILON * terms, "{operator}: {sum} of {terms}");
+        let conserved = Promise::new("Conservation", "PSE for strengths on unequal volumes");
+        conserved.in_units("eps sum abs", f64::EPSILON * terms).at_most(4.0, sum.abs());
         assert!(largest(out.into_iter()) > 1e-3 * largest(strengths.iter().copied()));
     }
     Ok(())
@@ -222,7 +225,8 @@ fn value_form_conserves_with_volumes_and_strength_form_is_volume_times_value_for
         sum += volume * of_values[p];
         assert!((volume * of_values[p] - of_strengths[p]).abs() <= 4.0 * round_off(n) * scale);
     }
-    assert!(sum.abs() <= 256.0 * 4.0 * f64::EPSILON * scale, "{sum}");
+    let conserved = Promise::new("Conservation", "PSE for values with volumes");
+    conserved.in_units("eps N max sum w V f", 256.0 * f64::EPSILON * scale).at_most(4.0, sum.abs());
     Ok(())
 }
 

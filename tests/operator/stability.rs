@@ -4,7 +4,8 @@ use crate::cases::cases;
 use parops::{
     Allowance, Apply, Binding, Cutoff, Epsilon, Error, ErrorKind, Euler, Exchange, Exponential, Kernel, Laplacian,
     LatticeSpectrum, Leapfrog, MultiIndex, Neighbor, NeighborError, Neighbors, OperatorError, ParticleError, Plan,
-    Policy, Pse, Rk4, Rows, StepLimit, Stepper, Term, TimeError, Volumes, WideGaussian, integrate, wide_gaussian_decay,
+    Policy, Pse, Rk4, Rows, StepLimit, Stepper, Term, TimeError, Volumes, WideGaussian, integrate, testing::Promise,
+    wide_gaussian_decay,
 };
 use proptest::prelude::*;
 use serde_json::Value;
@@ -97,7 +98,8 @@ fn wide_gaussian_matches<const D: usize>() {
         let kernel = Gaussian::<D>::wide();
         // The radius the reference sums to.
         let full = LatticeSpectrum::scan(&kernel, delta, if D == 3 && delta < 1.0 { 11.0 } else { 14.0 }).unwrap();
-        assert!(relative(full.lambda_max, number("lambda_max_no_cutoff")) < ROUNDING, "{D} {delta}: {full:?}");
+        let promise = Promise::new("Limits of steps", "lambda_max of the wide Gaussian on lattices against the table");
+        promise.at_most(ROUNDING, relative(full.lambda_max, number("lambda_max_no_cutoff")));
         assert!(relative(full.coefficient[0], number("effective_D_over_D_no_cutoff")) < ROUNDING, "{D} {delta}");
 
         let cut = LatticeSpectrum::scan(&WideGaussian::<D>::new(), delta, 5.0).unwrap();
@@ -141,7 +143,8 @@ fn laplacians_match<const D: usize>(exchange: impl Fn(u32) -> Exchange<D>) {
                     continue;
                 }
                 let scan = scan.unwrap();
-                assert!(relative(scan.lambda_max, number("lambda_max")) < PROMISED, "{D} {order} {delta}: {scan:?}");
+                let promise = Promise::new("Limits of steps", "lambda_max of Laplacians on lattices against the table");
+                promise.at_most(PROMISED, relative(scan.lambda_max, number("lambda_max")));
                 // The moment is of the size of the terms it cancels from, not of itself.
                 let moment = (scan.coefficient[D - 1] - number("discrete_second_moment_over_2")).abs();
                 assert!(moment < f64::from(order) * ROUNDING, "{D} {order} {delta}: {moment:e}");
@@ -218,8 +221,10 @@ fn explicit_euler_is_bounded_just_below_the_lattice_limit_and_grows_just_above()
         u.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()))
     };
     for stepper in [&mut Euler::new() as &mut dyn Stepper<_>, &mut Rk4::new()] {
-        assert!(largest(stepper, 0.999) < 1.0);
-        assert!(largest(stepper, 1.01) > 1e3);
+        let amplitude = |text| Promise::new("Limits of steps", text);
+        amplitude("amplitude after 2000 steps of 0.999 of the limit of a lattice")
+            .at_most(1.0, largest(stepper, 0.999));
+        amplitude("amplitude after 2000 steps of 1.01 of the limit of a lattice").at_least(1e3, largest(stepper, 1.01));
     }
 }
 
@@ -412,7 +417,8 @@ proptest! {
             pse.clone().allow(Allowance::Everywhere).assemble(&provider(pse.cutoff())).unwrap()
         };
         let (bound, radius) = (rows.report().spectral_bound, spectral_radius(&rows, &v));
-        prop_assert!(radius <= bound * (1.0 + ROUNDING), "{} > {}", radius, bound);
+        let limit = Promise::new("Limits of steps", "spectral radius of PSE rows over the bound of the rows");
+        limit.at_most(1.0 + ROUNDING, radius / bound);
     }
 }
 
@@ -425,7 +431,9 @@ fn row_bound_of_a_positive_definite_kernel_is_sharp_on_a_dense_set() {
     let pse = pse.allow(Allowance::Everywhere);
     let rows = pse.assemble(&AllPairs { points, reach: pse.cutoff().0 }).unwrap();
     let (bound, radius) = (rows.report().spectral_bound, spectral_radius(&rows, &v));
-    assert!(radius <= bound && radius > 0.99 * bound, "{radius} {bound}");
+    let dense =
+        Promise::new("Limits of steps", "spectral radius of PSE rows on a dense set over the bound of the rows");
+    dense.within(0.99, 1.0, radius / bound);
 }
 
 #[test]
@@ -434,12 +442,13 @@ fn advection_limits_of_central_pse_follow_from_the_imaginary_intervals() {
     let (rk4, leapfrog, euler) = (Rk4::<f64>::new(), Leapfrog::<f64>::new(), Euler::<f64>::new());
     let entries = bounds["advection_central"].as_object().unwrap();
     assert_eq!(entries.len(), 12);
-    for (name, entry) in entries {
+    for entry in entries.values() {
         let number = |key: &str| entry[key].as_f64().unwrap();
         for (stepper, key) in [(&rk4 as &dyn Stepper<f64>, "rk4"), (&leapfrog, "leapfrog"), (&euler, "explicit_euler")]
         {
             let limit = stepper.imaginary_interval() / number("max_abs_symbol");
-            assert!((limit - number(key)).abs() <= 4.0 * f64::EPSILON * limit, "{name} {key}: {limit}");
+            let promise = Promise::new("Limits of steps", "advection limits of central PSE against the table");
+            promise.in_units("eps", f64::EPSILON * limit).at_most(4.0, (limit - number(key)).abs());
         }
     }
 }

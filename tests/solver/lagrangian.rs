@@ -6,7 +6,7 @@ use parops::{
     AdvectionDiffusion, Allowance, Carried, CellList, Cutoff, DcPse, Domain, Error, ErrorKind, Euler, Eulerian, Face,
     Gradient, GrowthPolicy, Lagrangian, Lambda, Laplacian, Leapfrog, Limit, Mesh, MovingDiffusion, MovingScene,
     MovingSettings, MovingState, ParticleError, Particles, Pse, Rate, Remeshing, Result, Rk4, SavedParticles,
-    SolverError, Spacing, SspRk3, Steady, StepPolicy, Stepper, TimeError, Trigger, Volumes,
+    SolverError, Spacing, SspRk3, Steady, StepPolicy, Stepper, TimeError, Trigger, Volumes, testing::Promise,
 };
 
 const EPS: f64 = f64::EPSILON;
@@ -48,7 +48,8 @@ fn pure_advection_keeps_every_bit_of_every_strength() -> Result<()> {
     let mut run = Lagrangian::new(still, &particles, &u, &torus(), Rk4::new())?;
     let volumes = bits(run.volumes());
     run.advance(2.0, 0.02)?;
-    assert_eq!(bits(run.strengths()), bits(&expected));
+    let kept = Promise::new("Conservation", "strengths under pure advection, bits");
+    kept.equal(&bits(run.strengths()), &bits(&expected));
     assert_eq!(bits(run.volumes()), volumes);
     assert_ne!(run.points(), particles.points());
 
@@ -58,7 +59,7 @@ fn pure_advection_keeps_every_bit_of_every_strength() -> Result<()> {
         .divergence(|x: &[f64; 2], t: f64| 0.1 * TAU * (TAU * x[0]).cos() * t.cos());
     let mut run = Lagrangian::new(squeezed, &particles, &u, &torus(), SspRk3::new())?;
     run.advance(2.0, 0.02)?;
-    assert_eq!(bits(run.strengths()), bits(&expected));
+    kept.equal(&bits(run.strengths()), &bits(&expected));
     assert_ne!(bits(run.volumes()), volumes);
     assert!(run.volumes().iter().all(|&volume| volume > 0.0));
     assert!(run.ledger().fields[0].drift == 0.0);
@@ -93,7 +94,7 @@ fn volumes_and_values_follow_the_divergence_at_the_order_of_the_stepper() -> Res
         }
     };
     let order = (worst(false, 4)? / worst(false, 8)?).log2();
-    assert!((3.7..4.4).contains(&order), "{order}");
+    Promise::new("Orders", "volumes and values in a divergent flow, RK4").within(3.7, 4.4, order);
     // Differences of a linear velocity are exact but for rounding, eps/step of them.
     assert!((worst(true, 8)? - worst(false, 8)?).abs() < 1e-9);
     Ok(())
@@ -120,11 +121,12 @@ fn flow_turned_round_takes_particles_back_at_the_order_of_the_stepper() -> Resul
     // The errors of an even order cancel on the way back but for the next order.
     let order = |a: f64, b: f64| (a / b).log2();
     let (a, b) = (miss(Rk4::new, 0.05)?, miss(Rk4::new, 0.025)?);
-    assert!((3.7..5.5).contains(&order(a, b)), "{a:e} {b:e}");
+    let back = |text| Promise::new("Metamorphic relations", text);
+    back("M13 order at which particles come back, RK4").within(3.7, 5.5, order(a, b));
     let (a, b) = (miss(SspRk3::new, 0.05)?, miss(SspRk3::new, 0.025)?);
-    assert!((2.7..3.5).contains(&order(a, b)), "{a:e} {b:e}");
+    back("M13 order at which particles come back, SSP-RK3").within(2.7, 3.5, order(a, b));
     let (a, b) = (miss(Euler::new, 0.01)?, miss(Euler::new, 0.005)?);
-    assert!((0.8..1.2).contains(&order(a, b)), "{a:e} {b:e}");
+    back("M13 order at which particles come back, Euler").within(0.8, 1.2, order(a, b));
     Ok(())
 }
 
@@ -150,7 +152,8 @@ fn symmetric_pse_conserves_the_mass_over_ten_thousand_steps() -> Result<()> {
     run.advance_with(f64::from(STEPS) * 1e-3, 1e-3, |row, _| worst = worst.max(row.fields[0].drift.abs()))?;
     println!("drift {:e} of {size}", worst / size);
     assert_eq!(run.ledger().step, u64::from(STEPS));
-    assert!(worst <= DRIFT * size, "{worst:e}");
+    let mass = Promise::new("Conservation", "mass over 10^4 Lagrangian steps of PSE, relative");
+    mass.at_most(DRIFT, worst / size);
 
     // Volumes of their own that change with a flow.
     let ring = Domain::periodic([0.0], [1.0])?;
@@ -164,7 +167,7 @@ fn symmetric_pse_conserves_the_mass_over_ten_thousand_steps() -> Result<()> {
     let mut run = Lagrangian::new(scene, &particles, &u, &ring, Euler::new())?;
     let size = run.ledger().fields[0].size;
     run.advance_with(f64::from(STEPS) * 1e-3, 1e-3, |row, _| {
-        assert!(row.fields[0].drift.abs() <= DRIFT * size, "{:e}", row.fields[0].drift);
+        mass.at_most(DRIFT, row.fields[0].drift.abs() / size);
     })?;
     assert!(run.ledger().fields[0].size < 0.9 * size, "something was exchanged");
     Ok(())
@@ -194,7 +197,8 @@ fn dcpse_diffuses_on_a_distorted_set_without_remeshing_at_its_order() -> Result<
     let [(a, _), (b, drift)] = [sheared_decay(16)?, sheared_decay(32)?];
     let order = (a / b).log2();
     println!("errors {a:e} {b:e}, order {order}, drift {drift:e}");
-    assert!(b < 0.02 && (1.6..2.9).contains(&order), "{a:e} {b:e} {order}");
+    assert!(b < 0.02, "{a:e} {b:e}");
+    Promise::new("Orders", "DC-PSE diffusion on a distorted set, r = 2").within(1.6, 2.9, order);
     // Rows that are not symmetric do not conserve, and the ledger says so.
     assert!(drift > 1e-12);
     Ok(())
@@ -230,7 +234,8 @@ fn particles_cross_just_above_the_sharp_limit_and_not_below() -> Result<()> {
         run.step(dt)?;
         Ok(run.points().windows(2).all(|pair| pair[0][0] < pair[1][0]))
     };
-    assert!(ordered(0.99 / A)? && !ordered(1.01 / A)?);
+    let sharp = Promise::new("Limits of steps", "particles cross at 1.01 of the limit of distortion and not at 0.99");
+    sharp.holds(ordered(0.99 / A)? && !ordered(1.01 / A)?);
 
     // 7.16 in the plane, with the matrix of errata 37: the largest entry is 1, the norm 2. Particles in a row along the
     // diagonal change places beyond dt = 1/2, half of what the largest entry would allow.
@@ -241,13 +246,13 @@ fn particles_cross_just_above_the_sharp_limit_and_not_below() -> Result<()> {
         let mut run = Lagrangian::new(scene, &diagonal, &[1.0; 2], &Domain::open(), Euler::new())?
             .courant(0.999)?
             .step_policy(StepPolicy::Allow);
-        let within = dt <= run.limits()?.step(&Euler::<MovingState<2, f64>>::new());
+        let within = dt <= run.longest_step()?;
         run.step(dt)?;
         assert_eq!(run.ledger().within_limit, within);
         assert_eq!(within, dt < 0.5);
         Ok(run.points()[1][0] - run.points()[0][0])
     };
-    assert!(apart(0.99 * 0.5)? > 0.0 && apart(1.01 * 0.5)? < 0.0);
+    sharp.holds(apart(0.99 * 0.5)? > 0.0 && apart(1.01 * 0.5)? < 0.0);
     Ok(())
 }
 
@@ -265,6 +270,7 @@ fn lagrangian_cfl_refuses_adapts_and_allows_by_policy() -> Result<()> {
     let ErrorKind::Solver(SolverError::Limit { dt, limit, binding }) = error.kind() else { panic!("{error}") };
     assert_eq!((*dt, *binding), (0.2, Limit::Distortion));
     assert!((limit - 0.125).abs() < 1e-9);
+    assert_eq!(refusing.longest_step()?, *limit);
     assert_eq!(picture(&refusing), before);
     let mut adapting = run(StepPolicy::Adapt { most: 2 })?;
     let row = adapting.step(0.2)?;

@@ -14,6 +14,7 @@ mod hyperviscosity;
 mod jump;
 mod lagrangian;
 mod lagrangian_growth;
+mod relations;
 mod remeshed;
 mod resume;
 mod scene;

@@ -6,7 +6,7 @@ use parops::{
     AdvectionDiffusion, Allowance, Carried, CellList, Cutoff, DcPse, Domain, DomainError, Error, ErrorKind, Euler,
     Face, Lagrangian, Lambda, Laplacian, Limit, Mesh, MeshError, MeshKernel, MovingState, OperatorError, ParticleError,
     Particles, Pse, Remeshing, Result, Rk4, SolverError, Spacing, Steady, StepPolicy, Trigger, fill_distance,
-    least_gap,
+    least_gap, testing::Promise,
 };
 
 const EPS: f64 = f64::EPSILON;
@@ -90,7 +90,8 @@ fn remeshed_runs_keep_the_order_of_the_kernel_in_a_compressive_flow() {
             let order = slope(&errors);
             println!("({P}, {R}) CFL {cfl}: order {order:.3}, errors {:.2e} to {:.2e}", errors[0].1, errors[5].1);
             // What the regularity warrants, and no more than the exactness P: one remeshing misses by h^(P+1).
-            assert!((expected..P as f64 + 0.5).contains(&order), "({P}, {R}) at CFL {cfl}: {order}");
+            let promise = Promise::new("Orders", format!("remeshed runs in a compressive flow, Lambda({P}, {R})"));
+            promise.within(expected, P as f64 + 0.5, order);
         }
     }
     check::<2, 1, 4>(1.9);
@@ -128,8 +129,13 @@ fn remeshing_keeps_the_mass_to_rounding_and_the_moments_to_the_exactness() {
             for a in 0..=P as i32 {
                 for b in 0..=P as i32 - a {
                     let (before, after) = (moment(&points, &omega, a, b), moment(run.points(), run.strengths(), a, b));
-                    let limit = if a + b == 0 { 4.0 * 2.0 * EPS } else { 64.0 * EPS };
-                    assert!((after - before).abs() <= limit * size, "({P}, {R}): moment {a}, {b}: {}", after - before);
+                    let kept = |text| Promise::new("Conservation", text).in_units("eps sum abs", EPS * size);
+                    let apart = (after - before).abs();
+                    if a + b == 0 {
+                        kept("mass under one remeshing in 2D").at_most(4.0 * 2.0, apart);
+                    } else {
+                        kept("moments to the exactness under one remeshing").at_most(64.0, apart);
+                    }
                 }
             }
             assert!(run.ledger().fields[0].drift.abs() <= 8.0 * EPS * size);

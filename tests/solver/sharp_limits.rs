@@ -6,7 +6,7 @@ use parops::{
     AdvectionDiffusion, Allowance, CellList, DcPse, Domain, Epsilon, ErrorKind, Euler, Eulerian, Exchange, Gradient,
     GrowthPolicy, ImplicitScheme, Laplacian, LatticeSpectrum, Limit, MultiIndex, Nearest, Neighbors, Particles, Pse,
     Rate, Result, Rk4, Rkl2, Scene, SolverError, SspRk3, StepPolicy, Stepper, Term, TimeScheme, UpwindDcPse,
-    UpwindGradient,
+    UpwindGradient, testing::Promise,
 };
 
 use crate::dense;
@@ -56,6 +56,10 @@ fn radius(matrix: &DMatrix<f64>) -> f64 {
     f64::exp(logarithm + share * power.norm().ln())
 }
 
+fn radius_of(text: &'static str) -> Promise {
+    Promise::new("Limits of steps", text)
+}
+
 /// A run with this sharp rate refuses 1.01 of its limit by name and takes 0.99, and rightly so. Returns how many times
 /// longer the sharp limit is than that of the rows.
 fn sharp<const D: usize, S: Scene<D, Value = f64>>(
@@ -78,7 +82,8 @@ fn sharp<const D: usize, S: Scene<D, Value = f64>>(
     let mut run = run.step_policy(allow);
     let inside = radius(&step_matrix(&mut run, 0.99 * limit)?);
     let outside = radius(&step_matrix(&mut run, 1.01 * limit)?);
-    assert!(inside <= STABLE && outside > 1.0 + 1e-6, "{of}: {inside} {outside}");
+    radius_of("spectral radius of a step at 0.99 of a sharp limit").at_most(STABLE, inside);
+    radius_of("spectral radius of a step at 1.01 of a sharp limit").at_least(1.0 + 1e-6, outside);
     Ok(limit / rows)
 }
 

@@ -7,6 +7,7 @@ use nalgebra::{Complex, DMatrix, DVector, SVector};
 use parops::{
     Allowance, BiCgStab, BoundaryCondition, BoundaryRows, CellList, CsrMatrix, Cutoff, DcPse, Domain, Epsilon, Error,
     ErrorKind, Gmres, Implicit, Laplacian, LinearError, Particles, Pse, Random, Result, SparseSolver, TimeError,
+    testing::Promise,
 };
 use proptest::prelude::*;
 
@@ -89,14 +90,18 @@ fn implicit_schemes_have_their_order_on_a_stiff_system_with_a_source() {
                     Ok(())
                 };
                 let report = stepper.step(f64::from(step) * dt, dt, &mut u, source).unwrap();
-                assert!(report.residual <= 1e-13, "{report:?}");
+                Promise::new("Residuals", "implicit steps, relative").at_most(1e-13, report.residual);
             }
             let exact: Vec<f64> = w.iter().map(|w| w * (1.0 + 1.0_f64.sin())).collect();
             largest(&u, &exact)
         };
         let observed = (error(32) / error(64)).log2();
         let stated = f64::from(scheme(a.clone()).unwrap().order());
-        assert!((observed - stated).abs() < SLACK, "order {observed}, stated {stated}");
+        Promise::new("Orders", "implicit schemes on a stiff system, order less the stated one").within(
+            -SLACK,
+            SLACK,
+            observed - stated,
+        );
     }
 }
 
@@ -133,7 +138,11 @@ fn boundary_rows_of_the_moment_keep_the_order_in_time() {
         };
         let observed = (error(40) / error(80)).log2();
         let stated = f64::from(scheme(a.clone()).unwrap().order());
-        assert!((observed - stated).abs() < SLACK, "order {observed}, stated {stated}");
+        Promise::new("Orders", "implicit schemes with boundary rows, order less the stated one").within(
+            -SLACK,
+            SLACK,
+            observed - stated,
+        );
     }
 }
 
@@ -169,7 +178,8 @@ fn diffusion_numbers_of_a_million_are_stable_and_solved_as_promised() {
             assert!(error < tolerance, "{error:e}");
             let radius = ((&amplification + amplification.transpose()) / 2.0).symmetric_eigenvalues().amax();
             // The exact radius is 1, of the constant mode, which is solved no better than the others.
-            assert!(radius <= 1.0 + tolerance, "{radius}");
+            let million = Promise::new("Limits of steps", "spectral radius of implicit steps of diffusion number 10^6");
+            million.at_most(1.0 + tolerance, radius);
         }
     }
 }
@@ -187,7 +197,8 @@ fn stiff_steps_of_rough_fields_keep_their_mass() {
         }
         // Columns of A sum to rounding, |A| eps, which dt takes to 10^4 eps a step.
         let drift = (u.iter().sum::<f64>() - before).abs() / size;
-        assert!(drift < 20.0 * 1e4 * f64::EPSILON, "{drift:e}");
+        let stiff = Promise::new("Conservation", "mass over 20 implicit steps of diffusion number 10^4");
+        stiff.in_units("eps dt/dt_explicit", 1e4 * f64::EPSILON).at_most(20.0, drift);
     }
 }
 

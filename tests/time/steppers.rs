@@ -8,6 +8,7 @@ use nalgebra::{Complex, DVector, SVector, Vector3};
 use parops::{
     Apply, CellList, Domain, Epsilon, Error, ErrorKind, Euler, Exponential, Laplacian, Leapfrog, ParticleError,
     Particles, Plan, Policy, Pse, Result, Rk4, Rkl2, SspRk3, State, StepLimit, Stepper, TimeError, integrate,
+    testing::Promise,
 };
 use proptest::prelude::*;
 
@@ -51,7 +52,8 @@ fn leapfrog_started_by_euler_has_the_reference_errors_of_order_two() {
     let reference = [(100, 0.0191504637634472), (200, 0.004760645951750199), (400, 0.0011884802231654293)];
     for (n, expected) in reference {
         let error = rotation_error(&mut Leapfrog::new(), 10.0, n);
-        assert!((error - expected).abs() < DIGITS, "{n}: {error}");
+        let leapfrog = Promise::new("Orders", "errors of leapfrog started by Euler against the reference");
+        leapfrog.at_most(DIGITS, (error - expected).abs());
     }
 }
 
@@ -131,7 +133,8 @@ fn every_stepper_has_its_order_and_no_higher() {
         };
         let observed = (error(160) / error(320)).log2();
         let stated = f64::from(stepper.order());
-        assert!((observed - stated).abs() < SLACK, "order {observed}, stated {stated}");
+        let promise = Promise::new("Orders", "explicit steppers, order less the stated one");
+        promise.within(-SLACK, SLACK, observed - stated);
     }
 }
 
@@ -494,7 +497,8 @@ proptest! {
                 one.step(0.3 * f64::from(n), 0.3, &mut u, &mut decay).unwrap();
                 other.step(0.3 * f64::from(n), 0.3, &mut v, &mut decay).unwrap();
             }
-            prop_assert_eq!(u.iter().map(|x| x * factor).collect::<Vec<_>>(), v);
+            let scaled = u.iter().map(|x| x * factor).collect::<Vec<_>>();
+            Promise::new("Metamorphic relations", "M14 steps of states scaled by 2^k").equal(&scaled, &v);
         }
     }
 }
@@ -635,7 +639,9 @@ fn scaling_the_field_or_time_against_diffusivity_by_powers_of_two_keeps_the_bits
         let factor = f64::exp2(f64::from(k));
         let scaled: Vec<f64> = start.iter().map(|u| u * factor).collect();
         let expected: Vec<f64> = reference.iter().map(|u| u * factor).collect();
-        assert_eq!(diffuse(&scaled, 0.5, dt, steps), expected);
-        assert_eq!(diffuse(&start, 0.5 * factor, dt / factor, steps), reference);
+        let same = |text| Promise::new("Metamorphic relations", text);
+        same("M14 diffusion of a field scaled by 2^k").equal(&diffuse(&scaled, 0.5, dt, steps), &expected);
+        let faster = diffuse(&start, 0.5 * factor, dt / factor, steps);
+        same("M14 diffusion with time scaled against diffusivity").equal(&faster, &reference);
     }
 }

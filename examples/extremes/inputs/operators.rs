@@ -4,9 +4,9 @@ use std::error::Error;
 use std::f64::consts::TAU;
 
 use parops::{
-    Apply, CellList, Cutoff, DcPse, Epsilon, ErrorKind, Expression, Form, KernelError, Laplacian, MultiIndex,
-    MultiIndexError, Nearest, Neighbor, NeighborError, NeighborList, OperatorError, ParticleError, Particles, Pse,
-    Upwind, Volumes,
+    Apply, BruteForce, CellList, Cutoff, DcPse, Epsilon, ErrorKind, Expression, Form, KernelError, Laplacian,
+    MultiIndex, MultiIndexError, Nearest, Neighbor, NeighborError, NeighborList, Neighbors, OperatorError,
+    ParticleError, Particles, Pse, Upwind, Volumes,
 };
 
 use super::world::{H, SIDE, World, refused};
@@ -102,10 +102,13 @@ pub fn too_few(case: &mut Case, _: bool) -> Done {
     case.naive(!(miss < 1e-3), format!("normal equations give weights that miss it by {miss:.1e}"));
     let due = is!(Operator, OperatorError::TooFew { neighbors, conditions: 9, .. } if *neighbors < 9);
     let mut own = DcPse::<Laplacian<2>, 2>::new().neighbors_per_condition(1.0)?;
-    // Particle 0 has 9 within the distance of its farthest, by ties and images.
-    refused(case, &mut own, Some(1), due, |world, own| {
-        own.assemble(&Nearest::build(&world.particles, &world.torus, 5)?)
-    })?;
+    // A cutoff grows thrice by 1.15 before its row is refused: the first particle with fewer than 9 even then.
+    let world = World::new()?;
+    let nearest = Nearest::build(&world.particles, &world.torus, 5)?;
+    let everyone = BruteForce::build(&world.particles, &world.torus, Cutoff(nearest.reach()))?;
+    let grown = |p: usize| nearest.reach().min(nearest.cutoff(p) * 1.15_f64.powi(3));
+    let first = (0..world.particles.len()).find(|&p| everyone.count(p, grown(p)) < 9);
+    refused(case, &mut own, first, due, |_, own| own.assemble(&nearest))?;
     Ok(())
 }
 
@@ -116,9 +119,11 @@ pub fn lattice(case: &mut Case, _: bool) -> Done {
     let method = DcPse::at_order(sets::derivative([3, 0])?, 1)?;
     let method = method.sign(parops::Sign::Minus).neighbors_per_condition(1.0)?;
     let n = method.fewest_neighbors::<2>()?;
-    let miss = naive_error(&lattice, n);
-    case.naive(!(miss < 1e-3), format!("normal equations on {n} neighbors miss d2/dx2 of x^2/2 by {miss:.1e}"));
     let around = naive_dcpse::cut(lattice.points(), 0, n, naive_dcpse::wrapped);
+    let separations: Vec<[f64; 2]> = around.iter().map(|(_, s)| *s).collect();
+    let third = naive_dcpse::row(&separations, [3, 0], 1, H);
+    let miss = (third.apply(&separations, |x| x[0].powi(3) / 6.0) - 1.0).abs();
+    case.naive(!(miss < 1e-3), format!("normal equations on {n} neighbors miss d3/dx3 of x^3/6 by {miss:.1e}"));
     let row: Vec<Neighbor<2>> = around.iter().map(|(q, s)| Neighbor { q: *q, separation: *s, sign: 1 }).collect();
     let mut own = NeighborList::from_rows(lattice.len(), &[Some(0)], &[0, n], &row, Cutoff(4.0 * H), 0)?;
     let due = is!(Operator, OperatorError::Uncertified { .. } | OperatorError::Singular { .. });
@@ -199,8 +204,20 @@ pub fn flat_window(case: &mut Case, _: bool) -> Done {
         DcPse::<Laplacian<2>, 2>::new().epsilon(own.clone()).assemble(&world.cells)
     })?;
     let moment = is!(Operator, OperatorError::Moment { defect, limit } if defect > limit);
-    // The worst of all is named.
-    refused(case, &mut (), Some(77), moment, |world, ()| {
+    // The worst of all is named: that whose second moments, along either axis, miss 2 by most.
+    let world = World::new()?;
+    let within = BruteForce::build(&world.particles, &world.torus, Cutoff(2.0 * H))?;
+    let missed = |p: usize| {
+        let mut moments = [0.0_f64; 2];
+        within.for_each(p, 2.0 * H, |neighbor| {
+            let z = neighbor.separation.map(|s| s / (2.0 * H));
+            let eta = 4.0 / std::f64::consts::PI * (-z[0] * z[0] - z[1] * z[1]).exp();
+            moments.iter_mut().zip(z).for_each(|(moment, z)| *moment += 0.25 * eta * z * z);
+        });
+        moments.map(|moment| (moment - 2.0).abs()).into_iter().fold(0.0, f64::max)
+    };
+    let worst = (0..world.particles.len()).max_by(|&p, &q| missed(p).total_cmp(&missed(q)));
+    refused(case, &mut (), worst, moment, |world, ()| {
         let pse = Pse::new(Laplacian::<2>, 2, Epsilon::global(2.0 * H)?, world.particles.volumes()?)?.support(1.0)?;
         pse.assemble(&CellList::build(&world.particles, &world.torus, pse.cutoff())?)
     })?;

@@ -1,0 +1,90 @@
+//! The fuzz targets, on random bytes and on bytes that stand for plausible scenes.
+
+#[path = "cases/mod.rs"]
+mod cases;
+
+use parops::Random;
+use parops::testing::{FuzzFault, FuzzOutcome, Promise, fuzz_neighbor_build, fuzz_operator_build};
+
+type Target = fn(&[u8]) -> Result<FuzzOutcome, FuzzFault>;
+
+/// Enough for 60 points with all that belongs to them.
+const LONGEST: usize = 700;
+
+fn below(random: &mut Random, limit: usize) -> usize {
+    (random.uniform() * limit as f64) as usize
+}
+
+fn random_bytes(random: &mut Random) -> Vec<u8> {
+    (0..below(random, LONGEST)).map(|_| below(random, 256) as u8).collect()
+}
+
+fn promise(text: &'static str) -> Promise {
+    Promise::new("Input", text)
+}
+
+/// Runs the target and tells whether something was built.
+fn built(target: Target, bytes: &[u8]) -> bool {
+    let outcome = target(bytes);
+    if let Err(fault) = &outcome {
+        println!("{fault}\nbytes: {bytes:?}");
+    }
+    promise("what fuzzed bytes build equals the oracle and its moments, or is refused for a reason")
+        .holds(outcome.is_ok());
+    outcome.is_ok_and(|outcome| outcome == FuzzOutcome::Built)
+}
+
+/// The share of random bytes from which something is built.
+fn share_of_random_bytes(target: Target, seed: u64) -> f64 {
+    let mut random = Random::new(seed);
+    let cases = cases::cases() as usize;
+    let count = (0..cases).filter(|_| built(target, &random_bytes(&mut random))).count();
+    count as f64 / cases as f64
+}
+
+/// The share of scenes none of whose parts may be anything at all, then changed, cut or grown in a few places.
+fn share_of_scenes(target: Target, seed: u64) -> f64 {
+    let mut random = Random::new(seed);
+    let cases = cases::cases() as usize / 2;
+    let mut count = 0;
+    for _ in 0..cases {
+        let mut bytes = random_bytes(&mut random);
+        bytes.resize(bytes.len().max(2), 0);
+        bytes[1] %= 128;
+        for _ in 0..below(&mut random, 4) {
+            let at = below(&mut random, bytes.len());
+            match below(&mut random, 4) {
+                0 => bytes[at] = below(&mut random, 256) as u8,
+                1 => bytes.insert(at, below(&mut random, 256) as u8),
+                2 => bytes.truncate(at.max(2)),
+                _ => bytes[at] ^= 1 << below(&mut random, 8),
+            }
+        }
+        count += usize::from(built(target, &bytes));
+    }
+    count as f64 / cases as f64
+}
+
+#[test]
+fn neighbors_built_from_random_bytes_equal_the_oracle_or_are_refused_for_a_reason() {
+    let share = share_of_random_bytes(fuzz_neighbor_build, 1);
+    promise("share of random bytes that build neighbors").within(0.4, 0.9, share);
+}
+
+#[test]
+fn neighbors_built_from_plausible_scenes_equal_the_oracle() {
+    let share = share_of_scenes(fuzz_neighbor_build, 2);
+    promise("share of plausible scenes that build neighbors").at_least(0.6, share);
+}
+
+#[test]
+fn operators_built_from_random_bytes_keep_their_promises_or_are_refused_for_a_reason() {
+    let share = share_of_random_bytes(fuzz_operator_build, 3);
+    promise("share of random bytes that build operators").within(0.15, 0.9, share);
+}
+
+#[test]
+fn operators_built_from_plausible_scenes_keep_their_promises() {
+    let share = share_of_scenes(fuzz_operator_build, 4);
+    promise("share of plausible scenes that build operators").at_least(0.3, share);
+}
