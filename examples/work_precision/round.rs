@@ -11,8 +11,7 @@ const JITTER: f64 = 0.2;
 const CLEAR: f64 = 0.5;
 const SEED: u64 = 11;
 
-/// Particles, those on the boundary behind all others: rows of normal derivatives have no large diagonal, and incomplete
-/// factors of order 4 and more that start with them are useless.
+/// Particles, those on the boundary behind all others.
 pub struct Round<const D: usize> {
     pub h: f64,
     pub particles: Particles<D>,

@@ -1,10 +1,10 @@
 //! BiCGSTAB with an incomplete factor on the right.
 
-use super::ilu::{Ilu0, check_length};
+use super::ilu::Ilu0;
 use super::norm::{dot, inverse_power, norm};
-use super::stop::{SolveReport, Stop, check_right, check_solution};
+use super::stop::{SolveReport, Stop, check_solution, check_system};
 use crate::apply::Apply;
-use crate::error::{LinearError, Result};
+use crate::error::Result;
 
 /// How often a cycle that broke down and gained nothing is tried again with another shadow.
 const RETRIES: u32 = 3;
@@ -13,8 +13,9 @@ const RETRIES: u32 = 3;
 ///
 /// The preconditioner stands on the right, so that the residual is the true one. The recurrence only proposes: where it
 /// says that the tolerance is reached, or breaks down, the residual is computed anew from x and decides; a cycle that
-/// raised it is taken back, and tried again with another shadow vector up to three times. The start is x = 0, and b is scaled by a power of two, so that equal input gives equal bits
-/// and 2^k b gives 2^k x. It allocates in the first solve of a size only.
+/// raised it is taken back, and tried again with another shadow vector up to three times. The start is x = 0, and b is
+/// scaled by a power of two, so that equal input gives equal bits and 2^k b gives 2^k x. It allocates in the first solve of a
+/// size only.
 ///
 /// Defaults: at most 3000 products, relative residual 1e-13.
 ///
@@ -75,7 +76,7 @@ impl BiCgStab {
     /// With this relative residual to be reached.
     ///
     /// # Errors
-    /// [`LinearError::Setting`] where it is not in (0, 1).
+    /// [`LinearError::Setting`](crate::LinearError::Setting) where it is not in (0, 1).
     pub fn tolerance(self, residual: f64) -> Result<Self> {
         Ok(Self { stop: self.stop.at(residual)?, ..self })
     }
@@ -91,14 +92,7 @@ impl BiCgStab {
         b: &[f64],
         x: &mut [f64],
     ) -> Result<SolveReport> {
-        let (rows, columns) = (a.targets(), a.sources());
-        if rows != columns {
-            return Err(LinearError::NotSquare { rows, columns }.into());
-        }
-        check_length(preconditioner.map_or(rows, Ilu0::rows), rows)?;
-        check_length(b.len(), rows)?;
-        check_length(x.len(), rows)?;
-        check_right(b)?;
+        check_system(a, preconditioner, b, x)?;
         x.fill(0.0);
         let precondition = |x: &mut [f64]| preconditioner.map_or(Ok(()), |factors| factors.solve(x));
         let report = self.run(|x, y| a.apply(x, y), precondition, b, x)?;

@@ -1,10 +1,10 @@
 //! Restarted GMRES with an incomplete factor on the right.
 
-use super::ilu::{Ilu0, check_length};
+use super::ilu::Ilu0;
 use super::norm::{dot, inverse_power, norm};
-use super::stop::{SolveReport, Stop, check_right, check_solution};
+use super::stop::{SolveReport, Stop, check_solution, check_system};
 use crate::apply::Apply;
-use crate::error::{LinearError, Result};
+use crate::error::Result;
 use crate::particles::reserved;
 
 /// GMRES(m): the x of least residual |b - A x|_2 in a growing Krylov space, restarted every m iterations.
@@ -80,7 +80,7 @@ impl Gmres {
     /// With this relative residual to be reached.
     ///
     /// # Errors
-    /// [`LinearError::Setting`] where it is not in (0, 1).
+    /// [`LinearError::Setting`](crate::LinearError::Setting) where it is not in (0, 1).
     pub fn tolerance(self, residual: f64) -> Result<Self> {
         Ok(Self { stop: self.stop.at(residual)?, ..self })
     }
@@ -88,8 +88,9 @@ impl Gmres {
     /// Solves A x = b from x = 0, for a matrix or any other operator with as many targets as sources.
     ///
     /// # Errors
-    /// [`LinearError::NotSquare`] and [`LinearError::Length`] where shapes do not fit; [`LinearError::Value`] naming the
-    /// first entry of `b` that is not finite; [`LinearError::NotConverged`] where the residual is above the tolerance
+    /// [`LinearError::NotSquare`](crate::LinearError::NotSquare) and [`LinearError::Length`](crate::LinearError::Length)
+    /// where shapes do not fit; [`LinearError::Value`](crate::LinearError::Value) naming the first entry of `b` that is not
+    /// finite; [`LinearError::NotConverged`](crate::LinearError::NotConverged) where the residual is above the tolerance
     /// after the last iteration, or when a restart no longer lowers it (`x` then holds what was reached);
     /// [`ApplyError::Overflow`](crate::ApplyError::Overflow) where the solution is not finite; and the errors of the operator.
     pub fn solve(
@@ -99,16 +100,9 @@ impl Gmres {
         b: &[f64],
         x: &mut [f64],
     ) -> Result<SolveReport> {
-        let (rows, columns) = (a.targets(), a.sources());
-        if rows != columns {
-            return Err(LinearError::NotSquare { rows, columns }.into());
-        }
-        check_length(preconditioner.map_or(rows, Ilu0::rows), rows)?;
-        check_length(b.len(), rows)?;
-        let precondition = |x: &mut [f64]| preconditioner.map_or(Ok(()), |factors| factors.solve(x));
-        check_length(x.len(), rows)?;
-        check_right(b)?;
+        check_system(a, preconditioner, b, x)?;
         x.fill(0.0);
+        let precondition = |x: &mut [f64]| preconditioner.map_or(Ok(()), |factors| factors.solve(x));
         let report = self.run(|x, y| a.apply(x, y), precondition, b, x)?;
         self.stop.accept(report)
     }

@@ -6,9 +6,10 @@ use crate::particles::reserved;
 
 /// The incomplete factors L U ~ A that are zero wherever A is: ILU(0), the preconditioner of [`Gmres`](crate::Gmres).
 ///
-/// L has a unit diagonal; (L U)_pq = A_pq on the pattern of A, to which a diagonal place is added where it lacks one. On a
-/// tridiagonal matrix the factors are complete. Cost: for every entry left of the diagonal one sweep over two rows;
-/// memory as the matrix.
+/// L has a unit diagonal; (L U)_pq = A_pq on the pattern of A, to which a diagonal place is added where it lacks one. Rows are
+/// eliminated in their order, but those whose diagonal entry is not the largest of the row after all others: rows of
+/// normal derivatives, which would spoil what is eliminated after them. On a tridiagonal matrix without such rows the factors
+/// are complete. Cost: for every entry before the diagonal one sweep over two rows; memory as the matrix.
 ///
 /// ```
 /// use parops::{CsrMatrix, Ilu0};
@@ -22,10 +23,12 @@ use crate::particles::reserved;
 /// Source: J. A. Meijerink and H. A. van der Vorst, 1977.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ilu0 {
-    /// L below the diagonal, U on and above it.
+    /// L before the diagonal, U from it on, columns in the order of elimination.
     factors: CsrMatrix<f64>,
     /// The place of the diagonal entry of each row.
     diagonal: Vec<usize>,
+    /// The rows in the order of their elimination.
+    order: Vec<u32>,
 }
 
 impl Ilu0 {
@@ -36,11 +39,12 @@ impl Ilu0 {
     /// for its n entries, which is what rounding leaves of zero, or not finite.
     pub fn new(matrix: &CsrMatrix<f64>) -> Result<Self> {
         let n = square(matrix)?;
-        let mut factors = with_diagonal(matrix)?;
-        let mut diagonal = reserved(n)?;
+        let (mut factors, order) = in_order(with_diagonal(matrix)?)?;
+        let mut diagonal: Vec<usize> = reserved(n)?;
+        diagonal.resize(n, 0);
         // place[q] is where column q stands in the row at work.
         let mut place = vec![usize::MAX; n];
-        for row in 0..n {
+        for row in order.iter().map(|&row| row as usize) {
             let range = factors.offsets[row]..factors.offsets[row + 1];
             let mut largest = 0.0_f64;
             for at in range.clone() {
@@ -48,7 +52,7 @@ impl Ilu0 {
                 largest = largest.max(factors.values[at].abs());
             }
             let mut own = range.start;
-            while (factors.columns[own] as usize) < row {
+            while factors.columns[own] as usize != row {
                 let upper = factors.columns[own] as usize;
                 let pivot = diagonal[upper];
                 let factor = factors.values[own] / factors.values[pivot];
@@ -65,10 +69,10 @@ impl Ilu0 {
             if !(pivot.is_finite() && pivot.abs() > range.len() as f64 * f64::EPSILON * largest) {
                 return Err(Error::from(LinearError::ZeroPivot { pivot, largest }).at(row));
             }
-            diagonal.push(own);
+            diagonal[row] = own;
             factors.columns[range].iter().for_each(|&q| place[q as usize] = usize::MAX);
         }
-        Ok(Self { factors, diagonal })
+        Ok(Self { factors, diagonal, order })
     }
 
     /// Number of rows.
@@ -82,15 +86,16 @@ impl Ilu0 {
     /// [`LinearError::Length`] for a vector of another length.
     pub fn solve(&self, x: &mut [f64]) -> Result<()> {
         check_length(x.len(), self.rows())?;
-        let Self { factors, diagonal } = self;
+        let Self { factors, diagonal, order } = self;
         let sum = |from: usize, to: usize, x: &[f64]| -> f64 {
             let entries = factors.columns[from..to].iter().zip(&factors.values[from..to]);
             entries.fold(0.0, |sum, (&q, value)| sum + value * x[q as usize])
         };
-        for (row, &own) in diagonal.iter().enumerate() {
+        let rows = order.iter().map(|&row| (row as usize, diagonal[row as usize]));
+        for (row, own) in rows.clone() {
             x[row] -= sum(factors.offsets[row], own, x);
         }
-        for (row, &own) in diagonal.iter().enumerate().rev() {
+        for (row, own) in rows.rev() {
             x[row] = (x[row] - sum(own + 1, factors.offsets[row + 1], x)) / factors.values[own];
         }
         Ok(())
@@ -102,17 +107,18 @@ impl Ilu0 {
     /// [`LinearError::Length`] for a vector of another length.
     pub fn solve_transposed(&self, x: &mut [f64]) -> Result<()> {
         check_length(x.len(), self.rows())?;
-        let Self { factors, diagonal } = self;
+        let Self { factors, diagonal, order } = self;
         let spread = |from: usize, to: usize, y: f64, x: &mut [f64]| {
             for (&q, value) in factors.columns[from..to].iter().zip(&factors.values[from..to]) {
                 x[q as usize] -= value * y;
             }
         };
-        for (row, &own) in diagonal.iter().enumerate() {
+        let rows = order.iter().map(|&row| (row as usize, diagonal[row as usize]));
+        for (row, own) in rows.clone() {
             x[row] /= factors.values[own];
             spread(own + 1, factors.offsets[row + 1], x[row], x);
         }
-        for (row, &own) in diagonal.iter().enumerate().rev() {
+        for (row, own) in rows.rev() {
             spread(factors.offsets[row], own, x[row], x);
         }
         Ok(())
@@ -145,4 +151,36 @@ fn with_diagonal(matrix: &CsrMatrix<f64>) -> Result<CsrMatrix<f64>> {
         full.push_row(left.chain(own).chain(columns[before..].iter().zip(&values[before..]).map(entry)))?;
     }
     Ok(full)
+}
+
+/// The order of elimination, weak rows last, and the matrix with the columns of every row in that order.
+fn in_order(mut matrix: CsrMatrix<f64>) -> Result<(CsrMatrix<f64>, Vec<u32>)> {
+    let n = matrix.rows();
+    let weak: Vec<bool> = (0..n)
+        .map(|row| {
+            let (columns, values) = matrix.range(row);
+            let own = columns.binary_search(&(row as u32)).map_or(0.0, |at| values[at].abs());
+            values.iter().any(|value| value.abs() > own)
+        })
+        .collect();
+    let mut order: Vec<u32> = reserved(n)?;
+    order.extend((0..n as u32).filter(|&row| !weak[row as usize]));
+    order.extend((0..n as u32).filter(|&row| weak[row as usize]));
+    let mut last = Vec::new();
+    for row in 0..n {
+        let (mut to, past) = (matrix.offsets[row], matrix.offsets[row + 1]);
+        for at in to..past {
+            let entry = (matrix.columns[at], matrix.values[at]);
+            if weak[entry.0 as usize] {
+                last.push(entry);
+            } else {
+                (matrix.columns[to], matrix.values[to]) = entry;
+                to += 1;
+            }
+        }
+        for (at, entry) in (to..past).zip(last.drain(..)) {
+            (matrix.columns[at], matrix.values[at]) = entry;
+        }
+    }
+    Ok((matrix, order))
 }

@@ -104,10 +104,6 @@ impl SparseSolver {
 
     /// By GMRES with ILU(0): memory as two to three matrices and the vectors of [`Gmres`].
     ///
-    /// ILU(0) eliminates rows in their order, and rows of normal derivatives have small diagonals: number boundary
-    /// particles last. In a disc at order 8 it then takes some 20 products, and 400 do not help where they come first (example
-    /// `work_precision`).
-    ///
     /// # Errors
     /// As [`Ilu0::new`].
     pub fn gmres(matrix: CsrMatrix, gmres: Gmres) -> Result<Self> {

@@ -1,5 +1,7 @@
-//! When an iteration ends, and what it reports.
+//! What iterations have in common: the systems they take, when they end, and what they report.
 
+use super::ilu::{Ilu0, check_length};
+use crate::apply::Apply;
 use crate::error::{ApplyError, Error, LinearError, Result};
 
 /// What a solve of A x = b did.
@@ -41,6 +43,23 @@ impl Stop {
             Err(LinearError::NotConverged { iterations, residual, tolerance }.into())
         }
     }
+}
+
+/// Refuses a system whose shapes do not fit, or whose right-hand side is not finite.
+pub(super) fn check_system(
+    a: &(impl Apply<f64> + ?Sized),
+    preconditioner: Option<&Ilu0>,
+    b: &[f64],
+    x: &[f64],
+) -> Result<()> {
+    let (rows, columns) = (a.targets(), a.sources());
+    if rows != columns {
+        return Err(LinearError::NotSquare { rows, columns }.into());
+    }
+    check_length(preconditioner.map_or(rows, Ilu0::rows), rows)?;
+    check_length(b.len(), rows)?;
+    check_length(x.len(), rows)?;
+    check_right(b)
 }
 
 /// Refuses a right-hand side that is not finite.

@@ -4,7 +4,7 @@ use crate::cases::cases;
 use nalgebra::{DMatrix, DVector};
 use parops::{
     Apply, ApplyError, BoundaryCondition, BoundaryError, BoundaryRows, CellList, Contraction, CsrMatrix, Cutoff, DcPse,
-    Domain, ErrorKind, Face, Fallback, Gradient, Laplacian, LinearError, MultiIndex, MultiIndexError, Nearest,
+    Domain, ErrorKind, Face, Fallback, Gmres, Gradient, Laplacian, LinearError, MultiIndex, MultiIndexError, Nearest,
     OperatorError, Particles, Plan, Random, Rk4, Rows, Sign, SparseSolver, StepLimit, graded, integrate,
     testing::Promise,
 };
@@ -726,4 +726,61 @@ fn report_of_the_rows_names_particles() {
     assert!(report.worst_rows().count() == 8 && report.worst_rows().all(|row| set.normals[row.target].is_some()));
     // Numbers of conditions would be small ones.
     assert!(report.worst_rows().any(|row| row.target >= report.rows));
+}
+
+/// Scattered particles of a disc and, last, those of its rim with their normals.
+fn disc(across: usize) -> (Particles<2>, Vec<(usize, [f64; 2])>) {
+    let (h, mut random, mut points) = (1.0 / across as f64, Random::new(11), Vec::new());
+    for number in 0..(across + 1).pow(2) {
+        let index = [number % (across + 1), number / (across + 1)];
+        let x = index.map(|i| h * (i as f64 + 0.4 * random.uniform() - 0.2) - 0.5);
+        if x[0].hypot(x[1]) <= 0.5 - 0.5 * h {
+            points.push(x);
+        }
+    }
+    let (inside, count) = (points.len(), (std::f64::consts::PI * across as f64).round() as usize);
+    let normal = |i: usize| std::f64::consts::TAU * i as f64 / count as f64;
+    let rim: Vec<_> = (0..count).map(|i| (inside + i, [normal(i).cos(), normal(i).sin()])).collect();
+    points.extend(rim.iter().map(|(_, normal)| normal.map(|n| 0.5 * n)));
+    (Particles::new(points).unwrap(), rim)
+}
+
+#[test]
+fn incomplete_factors_serve_however_boundary_particles_are_numbered() -> Result<(), parops::Error> {
+    const PRODUCTS: usize = 60;
+    let (set, rim) = disc(36);
+    let n = set.len();
+    let mut shuffled: Vec<usize> = (0..n).collect();
+    let mut random = Random::new(3);
+    for i in (1..n).rev() {
+        shuffled.swap(i, (random.uniform() * (i + 1) as f64) as usize);
+    }
+    let conditions: Vec<_> = rim
+        .iter()
+        .map(
+            |&(p, normal)| {
+                if normal[1] > 0.0 { BoundaryCondition::dirichlet(p) } else { BoundaryCondition::neumann(p, normal) }
+            },
+        )
+        .collect();
+    for order in [2, 6, 8] {
+        let gradient = DcPse::at_order(Gradient::<2>, order)?.neighbors_per_condition(3.0)?;
+        let laplacian = DcPse::at_order(Laplacian::<2>, order)?;
+        let k = laplacian.fewest_neighbors::<2>()?.max(gradient.fewest_neighbors::<2>()?);
+        let near = Nearest::build(&set, &Domain::open(), k)?;
+        let mut matrix = laplacian.assemble(&near)?.to_csr(0)?;
+        BoundaryRows::build(&conditions, order, &near)?.replace_in(&mut matrix)?;
+        // Last as they are, first, and anywhere.
+        let first = (0..n).map(|p| (p + rim.len()) % n).collect();
+        for numbers in [(0..n).collect(), first, shuffled.clone()] {
+            let renumbered = |(p, q, w): (usize, usize, f64)| (numbers[p], numbers[q], w);
+            let matrix = CsrMatrix::from_triplets(n, n, matrix.triplets().map(renumbered))?;
+            let (right, mut u) = (vec![1.0; n], vec![0.0; n]);
+            let gmres = Gmres::new().tolerance(1e-12)?.most(PRODUCTS);
+            let report = SparseSolver::gmres(matrix, gmres)?.solve(&right, &mut u)?;
+            Promise::new("Residuals", "products of GMRES with ILU(0), rows of normal derivatives anywhere")
+                .at_most(PRODUCTS as f64, report.iterations as f64);
+        }
+    }
+    Ok(())
 }

@@ -125,7 +125,8 @@ impl<const D: usize> Judge<D> for Exchanged<D> {
         let (mut own, mut size) = (0.0, 0.0);
         for (neighbor, &w) in stencil.iter().zip(weights) {
             let z = neighbor.separation.map(|s| s * inverse);
-            let pair = power(power(self.volumes.get(neighbor.q), D as u32) * self.kernel.value(&z), self.degree());
+            let volume = power(self.volumes.get(neighbor.q), D as u32);
+            let pair = volume * (self.kernel.value(&z) * power(1.0, self.degree()));
             let weight = pair * f64::from(neighbor.sign);
             // Each factor rounds once.
             let tolerance = 2.0 * f64::from(2 * self.degree() + D as u32 + 2) * eps * weight.abs() + 2.0 * least;

@@ -45,13 +45,13 @@ impl<const D: usize> Judge<D> for OneWay<D> {
         let lost: f64 = stencil.signs().iter().zip(&signed).filter(|(sign, _)| **sign < 0).map(|(_, w)| -2.0 * w).sum();
         close("a diagonal", p, diagonal, lost, 2.0 * (stencil.len() as f64 + 2.0) * eps * lost.abs())?;
         for (separation, &w) in stencil.separations().iter().zip(&signed) {
-            let upwind = (0..D).any(|axis| v[axis] * separation[axis] > 0.0);
+            let along = |axis: usize| Side::upwind(v[axis]).map_or(0.0, Side::sign) * separation[axis];
+            let upwind = (0..D).any(|axis| along(axis) > 0.0);
             if w > 0.0 || (w != 0.0 && !upwind) {
                 return Err(FuzzFault::Accepted { build: "Upwind", p, value: w });
             }
         }
-        let covered = matches!(self.allowance, Allowance::Everywhere);
-        if !covered && !(report.moment_defect <= self.tolerance) {
+        if self.allowance == Allowance::Nowhere && !(report.moment_defect <= self.tolerance) {
             return Err(FuzzFault::Accepted { build: "Upwind", p, value: report.moment_defect });
         }
         for axis in 0..D {
