@@ -4,7 +4,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::cases::cases;
 use crate::solvers::{solve, stencil};
-use parops::{Ladder, Lu, MultiIndex, Term, graded, required_moment, testing::Promise};
+use parops::{Ladder, Lu, MultiIndex, Rung, Term, graded, required_moment, testing::Promise};
 
 /// The unevaluated sum of two doubles.
 #[derive(Clone, Copy)]
@@ -122,17 +122,27 @@ fn weights<const D: usize>(z: &[[f64; D]], beta: MultiIndex<D>, order: u32) -> V
     rows.iter().zip(&window).map(weight).collect()
 }
 
+/// What a backward stable solver is held to (verification figure).
+const FORWARD: f64 = 8.0;
+
 /// The largest error of a weight over the largest weight, in units of cond eps.
 fn compare<const D: usize>(beta: MultiIndex<D>, order: u32, cut: usize, seed: u64) {
     let l = graded::<D>(u32::from(beta.is_even()), beta.degree() + order - 1).count();
     let z = stencil::<D>(2 * l, 0.3, cut, seed);
-    let (_, w, _) = solve(&Ladder, beta, order, &z).unwrap();
+    let (_, w, solution) = solve(&Ladder, beta, order, &z).unwrap();
     let (.., exact) = solve(&Lu, beta, order, &z).unwrap();
     let reference = weights(&z, beta, order);
     let largest = reference.iter().fold(0.0_f64, |largest, w| largest.max(w.0.abs()));
     let miss = w.iter().zip(&reference).map(|(&w, r)| ((w - r.0) - r.1).abs()).fold(0.0, f64::max);
-    let promise = Promise::new("Residuals", "weights against 30 digits on whole, half and quarter stencils");
-    promise.in_units("cond eps max w", f64::EPSILON * exact.condition * largest).at_most(8.0, miss);
+    let promise =
+        |text| Promise::new("Residuals", text).in_units("cond eps max w", f64::EPSILON * exact.condition * largest);
+    if solution.rung == Rung::Cholesky {
+        let reason = "normal equations are taken as they are where their moments hold, and lose cond once more";
+        let plain = promise("weights of plain Cholesky against 30 digits on whole, half and quarter stencils");
+        plain.short_of(FORWARD, reason).at_most(64.0, miss);
+    } else {
+        promise("weights of corrected rows against 30 digits on the same stencils").at_most(FORWARD, miss);
+    }
 }
 
 #[test]

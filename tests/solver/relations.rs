@@ -21,7 +21,7 @@ fn stirred(side: usize, strength: f64, speed: f64, steps: u32) -> Result<(Bits, 
         let [a, b] = x.map(|x| TAU * x);
         [0.3 * a.sin() * b.cos(), -0.3 * a.cos() * b.sin()].map(|v| speed * v)
     });
-    let pse = Pse::new(Laplacian::<2>, 2, particles.spacing()?.epsilon(1.0)?, particles.volumes()?)?;
+    let pse = Pse::new(Laplacian::<2>, 2, particles.spacing()?.epsilon(1.6)?, particles.volumes()?)?;
     let pse = pse.support(2.5)?.allow(Allowance::Everywhere);
     let scene = AdvectionDiffusion::<2>::new().diffusion(1e-3 * speed, pse).advection(swirl, Carried);
     let mesh = Mesh::cells(&torus, [side; 2])?;
