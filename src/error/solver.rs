@@ -127,6 +127,12 @@ kinds! {
             /// Time.
             t: f64,
         } => "the divergence of the velocity at t = {t} is {value}",
+        /// An image of a domain the provider does not name, where the divergence of a velocity is to be computed: behind a mirror
+        /// its normal component is turned.
+        UnknownImage {
+            /// The particle whose image it is.
+            q: usize,
+        } => "an image of particle {q} is within reach, and the provider does not say of which domain",
         /// A flow across a mirror, where its divergence is to be computed: behind a mirror the normal component is turned.
         CrossesMirror {
             /// The axis of the mirror.

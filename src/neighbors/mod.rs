@@ -82,7 +82,8 @@ pub trait Neighbors<const D: usize>: Sync {
     /// The generation of the particle set this provider answers for.
     fn generation(&self) -> u64;
 
-    /// The domain whose images stand in the rows. `None`, as by default, says that no image stands behind a mirror.
+    /// The domain whose images stand in the rows; `None`, as by default, where the provider does not say. The divergence of a
+    /// velocity is then computed only where no image is within reach.
     fn domain(&self) -> Option<&Domain<D>> {
         None
     }

@@ -10,11 +10,12 @@ pub(crate) struct Reflected<'a, P, const D: usize> {
     provider: &'a P,
     points: &'a [[f64; D]],
     axis: Option<usize>,
+    far: &'a [bool],
 }
 
 impl<'a, P: Neighbors<D>, const D: usize> Reflected<'a, P, D> {
-    pub(crate) fn new(provider: &'a P, points: &'a [[f64; D]], axis: Option<usize>) -> Self {
-        Self { provider, points, axis }
+    pub(crate) fn new(provider: &'a P, points: &'a [[f64; D]], axis: Option<usize>, far: &'a [bool]) -> Self {
+        Self { provider, points, axis, far }
     }
 
     /// The place of the mirror of this axis that a neighbor of target p stands behind.
@@ -61,6 +62,9 @@ impl<P: Neighbors<D>, const D: usize> Neighbors<D> for Reflected<'_, P, D> {
     }
 
     fn for_each(&self, p: usize, cutoff: f64, mut visit: impl FnMut(Neighbor<D>)) {
+        if self.far.get(p).copied().unwrap_or(false) {
+            return;
+        }
         self.provider.for_each(p, cutoff, |neighbor| {
             let behind = self.axis.is_some_and(|axis| self.mirror(p, axis, &neighbor).is_some());
             visit(Neighbor { sign: if behind { -1 } else { 1 }, ..neighbor });

@@ -21,7 +21,7 @@ pub trait FlowDivergence<const D: usize>: Sync {
     /// Makes what is kept.
     ///
     /// # Errors
-    /// As [`Transport::gradient`].
+    /// As [`Transport::gradient`]; [`SolverError::UnknownImage`] where a provider has images and does not say of which domain.
     fn build<X: Transport<D>, P: Neighbors<D>>(
         &self,
         scheme: &X,
@@ -86,7 +86,7 @@ impl<F: Fn(&[f64; D], f64) -> f64 + Sync, const D: usize> FlowDivergence<D> for 
 ///
 /// Behind a mirror the normal component of the velocity is turned and the others are not, whatever the sign of u there: the
 /// flow must not cross a mirror. Of a velocity that is known between the particles this is checked. Rows of the particles
-/// beside mirrors are kept for it, D for each.
+/// beside mirrors are kept for it, D + 1 for each, until the divergence of a steady velocity is known.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ComputedDivergence;
 
@@ -109,41 +109,44 @@ struct Walls<const D: usize> {
     plain: Option<Rows<[f64; D]>>,
 }
 
-/// How much of the largest speed may stand normal to a mirror: rounding of the velocity and of the place.
-const CROSSING: f64 = 1e-8;
+/// How much of the largest speed may stand normal to a mirror: rounding of velocities that are evaluated in `f32`.
+const CROSSING: f64 = 8.0 * f32::EPSILON as f64;
 
 impl<const D: usize> Walls<D> {
     fn build<X: Transport<D>, P: Neighbors<D>>(scheme: &X, site: &Site<D>, neighbors: &P) -> Result<Option<Self>> {
-        if !neighbors.domain().is_some_and(|domain| (0..D).any(|axis| domain.mirrors(axis).next().is_some())) {
+        let (points, reach) = (site.points(), neighbors.reach());
+        let Some(domain) = neighbors.domain() else {
+            return check_images(site, neighbors).map(|()| None);
+        };
+        let mirrors = || (0..D).flat_map(|axis| domain.mirrors(axis).map(move |place| (axis, place)));
+        let seen = Reflected::new(neighbors, points, None, &[]);
+        let (mut beside, mut far) = (Vec::new(), vec![true; points.len()]);
+        for (p, x) in site.free() {
+            if !mirrors().any(|(axis, place)| (x[axis] - place).abs() <= reach) {
+                continue;
+            }
+            let before = beside.len();
+            neighbors.for_each(p, reach, |neighbor| {
+                for axis in 0..D {
+                    if let Some(place) = seen.mirror(p, axis, &neighbor)
+                        && !beside[before..].contains(&(p, axis, place))
+                    {
+                        beside.push((p, axis, place));
+                    }
+                }
+            });
+            far[p] = beside.len() == before;
+        }
+        if beside.is_empty() {
             return Ok(None);
         }
-        let points = site.points();
-        let seen = Reflected::new(neighbors, points, None);
-        let mut beside = Vec::new();
-        let mut far = Vec::new();
-        for p in 0..points.len() {
-            let before = beside.len();
-            if !site.prescribed(p) {
-                neighbors.for_each(p, neighbors.reach(), |neighbor| {
-                    for axis in 0..D {
-                        if let Some(place) = seen.mirror(p, axis, &neighbor)
-                            && !beside[before..].contains(&(p, axis, place))
-                        {
-                            beside.push((p, axis, place));
-                        }
-                    }
-                });
-            }
-            if beside.len() == before {
-                far.push(p);
-            }
-        }
         let mut near = site.clone();
-        near.prescribe(far);
-        let plain = scheme.gradient(&near, &seen)?;
+        near.prescribe((0..points.len()).filter(|&p| far[p]));
+        let rows = |axis| scheme.gradient(&near, &Reflected::new(neighbors, points, axis, &far));
+        let plain = rows(None)?;
         let mut turned = Vec::new();
         for axis in 0..D {
-            turned.extend(scheme.gradient(&near, &Reflected::new(neighbors, points, Some(axis)))?);
+            turned.extend(rows(Some(axis))?);
         }
         Ok(Some(Self { beside, turned, plain }))
     }
@@ -212,6 +215,9 @@ impl<const D: usize> FlowDivergence<D> for ComputedDivergence {
             }
             divergence.push(value);
         }
+        if velocity.steady() {
+            *walls = None;
+        }
         Ok(())
     }
 
@@ -219,6 +225,29 @@ impl<const D: usize> FlowDivergence<D> for ComputedDivergence {
     fn at(&self, values: &DivergenceValues<D>, p: usize, _: &[f64; D], _: f64) -> Option<f64> {
         values.divergence.get(p).copied()
     }
+}
+
+/// Refuses images of which the provider does not say what turns in them.
+fn check_images<const D: usize, P: Neighbors<D>>(site: &Site<D>, neighbors: &P) -> Result<()> {
+    /// Of the reach: what rounding may leave between a separation and the difference of the places.
+    const ROUNDING: f64 = 1e-9;
+    let points = site.points();
+    for (p, x) in site.free() {
+        let mut image = None;
+        neighbors.for_each(p, neighbors.reach(), |neighbor| {
+            let own = points.get(neighbor.q).is_some_and(|y| {
+                (0..D)
+                    .all(|axis| (neighbor.separation[axis] - (x[axis] - y[axis])).abs() <= ROUNDING * neighbors.reach())
+            });
+            if !own || neighbor.sign < 0 {
+                image = Some(neighbor.q);
+            }
+        });
+        if let Some(q) = image {
+            return Err(Error::from(SolverError::UnknownImage { q }).at(p));
+        }
+    }
+    Ok(())
 }
 
 /// Refuses a flow across mirrors; at a velocity that is known only at the particles it cannot be looked at.

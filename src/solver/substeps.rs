@@ -31,7 +31,10 @@ impl Substeps {
     /// # Errors
     /// [`SolverError::Substeps`] where that takes more of them than are left.
     pub(super) fn next(&mut self, limit: f64, binding: Option<Limit>) -> Result<f64> {
-        let parts = (self.rest() / limit).ceil().max(1.0);
+        // Rounding of the times is no reason for one part more.
+        let rounding =
+            f64::EPSILON * (4.0 * self.rest() + 2.0 * self.t.abs().max(self.end.abs()) * f64::from(self.taken + 1));
+        let parts = ((self.rest() - rounding) / limit).ceil().max(1.0);
         if !(parts <= f64::from(self.most - self.taken.min(self.most))) {
             let binding = binding.unwrap_or(Limit::Diffusion);
             return Err(SolverError::Substeps { dt: self.dt, limit, binding, most: self.most }.into());

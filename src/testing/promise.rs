@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::{env, thread};
 
-use super::verification::Line;
+use super::verification::{BROKEN, Line};
 
 /// One promise and its bound: an assertion that leaves a line for a [`Verification`](super::Verification).
 ///
@@ -25,7 +25,8 @@ use super::verification::Line;
 /// ```
 ///
 /// # Panics
-/// Every verb panics where its promise is broken, and where one test states a promise with two bounds.
+/// Every verb panics where its promise is broken or what it measured is not finite, and where promises are recorded and one
+/// test states one of them with two bounds.
 #[derive(Clone, Debug)]
 #[must_use = "a promise is checked by a bound"]
 pub struct Promise {
@@ -69,18 +70,20 @@ impl Promise {
     #[track_caller]
     pub fn at_most(&self, bound: f64, measured: f64) {
         let size = self.size();
+        let held = measured.is_finite() && measured <= bound * size;
         let missed = self.aim.is_some_and(|(aim, _)| !(measured <= aim * size));
         let bound_text = || format!("<= {}", number(bound));
-        self.record(bound_text, measured / size, measured / size, measured <= bound * size, missed);
+        self.record(bound_text, measured / size, measured / size, held, missed);
     }
 
     /// measured >= bound.
     #[track_caller]
     pub fn at_least(&self, bound: f64, measured: f64) {
         let size = self.size();
+        let held = measured.is_finite() && measured >= bound * size;
         let missed = self.aim.is_some_and(|(aim, _)| !(measured >= aim * size));
         let bound_text = || format!(">= {}", number(bound));
-        self.record(bound_text, -measured / size, measured / size, measured >= bound * size, missed);
+        self.record(bound_text, -measured / size, measured / size, held, missed);
     }
 
     /// low <= measured <= high; an aim has no meaning here.
@@ -88,7 +91,7 @@ impl Promise {
     pub fn within(&self, low: f64, high: f64, measured: f64) {
         let size = self.size();
         let off = (measured / size - 0.5 * (low + high)).abs();
-        let held = low * size <= measured && measured <= high * size;
+        let held = measured.is_finite() && low * size <= measured && measured <= high * size;
         let bound_text = || format!("{} to {}", number(low), number(high));
         self.record(bound_text, off, measured / size, held, false);
     }
@@ -134,7 +137,7 @@ impl Promise {
         }
         let Some(test) = test() else { return };
         let verdict = match self.aim {
-            _ if !held => "broken".into(),
+            _ if !held => BROKEN.into(),
             Some((_, reason)) if missed => format!("short: {reason}"),
             _ => "held".into(),
         };

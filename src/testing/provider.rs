@@ -141,7 +141,7 @@ pub fn check_provider<const D: usize>(provider: &impl Neighbors<D>) -> Result {
 }
 
 /// Checks a provider as [`check_provider`] does, and that its rows are those of `oracle` as sets, bit for bit, at
-/// the smaller of the two reaches and below. Where the oracle has mirrors, the provider tells of the same.
+/// the smaller of the two reaches and below. By its domain it tells of the mirrors that the oracle has, and of no others.
 ///
 /// [`BruteForce`](crate::BruteForce) on the same points and domain is the oracle to take.
 ///

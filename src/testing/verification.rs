@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::{fmt, fs, io};
 
+/// The verdict on a promise that is not kept.
+pub(super) const BROKEN: &str = "broken";
+
 /// One promise, as a test showed it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Line {
@@ -16,7 +19,7 @@ pub(super) struct Line {
 }
 
 /// Where a line stands in the table: numbers in the promise count as numbers, so that M2 comes before M10.
-type Place = (String, Vec<(String, u64)>, String);
+type Place = (String, Vec<(String, u64)>, String, String);
 
 impl Line {
     /// Fields between tabs.
@@ -45,7 +48,7 @@ impl Line {
             parts.push((text.into(), tail[..end].parse().unwrap_or(0)));
             rest = &tail[end..];
         }
-        (self.section.clone(), parts, self.test.clone())
+        (self.section.clone(), parts, self.promise.clone(), self.test.clone())
     }
 }
 
@@ -82,7 +85,7 @@ impl Verification {
     }
 
     /// Lines of section, promise, bound, measured value, verdict and test between tabs; of those with the same section,
-    /// promise and test the last counts.
+    /// promise and test the last counts, or one that is broken.
     ///
     /// # Errors
     /// The first line that has not six fields; that there is none.
@@ -96,7 +99,10 @@ impl Verification {
     }
 
     fn push(&mut self, line: Line) {
-        self.lines.insert(line.place(), line);
+        let known = self.lines.entry(line.place()).or_insert_with(|| line.clone());
+        if known.verdict != BROKEN {
+            *known = line;
+        }
     }
 
     /// Reads the tables of a page.
@@ -118,7 +124,7 @@ impl Verification {
 
     /// Promises that are broken.
     pub fn broken(&self) -> impl Iterator<Item = String> {
-        self.lines.values().filter(|line| line.verdict == "broken").map(ToString::to_string)
+        self.lines.values().filter(|line| line.verdict == BROKEN).map(ToString::to_string)
     }
 
     /// What differs from a page in promises, bounds, verdicts and names of tests.

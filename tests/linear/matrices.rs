@@ -142,7 +142,10 @@ proptest! {
         // Some rows, or all of them, without a large diagonal.
         let weaken = |(p, q, w): (usize, usize, f64)| (p, q, if p == q && p % weak == 0 { 0.1 * w } else { w });
         let a = CsrMatrix::from_triplets(n, n, a.triplets().map(weaken)).unwrap();
-        let Ok(factors) = Ilu0::new(&a) else { return Ok(()) };
+        let factors = Ilu0::new(&a);
+        // Rejects are counted: too many of them fail.
+        prop_assume!(factors.is_ok());
+        let factors = factors.unwrap();
         // The columns of (L U)^-1, inverted, are L U.
         let mut inverse = DMatrix::zeros(n, n);
         let mut transposed = DMatrix::zeros(n, n);

@@ -55,6 +55,62 @@ fn computed_divergence_beside_mirrors_keeps_the_order_of_the_rows() -> Result<()
 }
 
 #[test]
+fn computed_divergence_keeps_its_order_in_corners_and_on_mirrors() -> Result<()> {
+    // The flow goes along all four walls; the first row and column of the particles stand on theirs.
+    let walls = Domain::new([0.0; 2], [1.0; 2], [[Face::MirrorEven; 2]; 2])?;
+    let at = |n: usize| {
+        let moved = Particles::<2>::jittered([0.0; 2], [1.0; 2], [n; 2], 0.2, 8)?;
+        let snapped = |x: &[f64; 2]| x.map(|x| if x < 1.0 / n as f64 { 0.0 } else { x });
+        let set = Particles::new(moved.points().iter().map(snapped).collect())?;
+        miss(&DcPse::<Gradient<2>, 2>::new(), &set, &Nearest::build(&set, &walls, 24)?)
+    };
+    let order = (at(24)? / at(48)?).log2();
+    Promise::new("Orders", "divergence computed in corners and on mirrors, DC-PSE of order 2").at_least(1.7, order);
+    Ok(())
+}
+
+/// A provider that keeps to itself which domain its images are of.
+struct Silent(Nearest<2>);
+
+impl Neighbors<2> for Silent {
+    fn targets(&self) -> usize {
+        self.0.targets()
+    }
+    fn sources(&self) -> usize {
+        self.0.sources()
+    }
+    fn center(&self, p: usize) -> Option<usize> {
+        self.0.center(p)
+    }
+    fn cutoff(&self, p: usize) -> f64 {
+        self.0.cutoff(p)
+    }
+    fn reach(&self) -> f64 {
+        self.0.reach()
+    }
+    fn generation(&self) -> u64 {
+        self.0.generation()
+    }
+    fn for_each(&self, p: usize, cutoff: f64, visit: impl FnMut(parops::Neighbor<2>)) {
+        self.0.for_each(p, cutoff, visit);
+    }
+}
+
+#[test]
+fn images_of_a_domain_that_is_not_named_are_refused_where_the_divergence_is_computed() -> Result<()> {
+    let set = Particles::jittered([0.0; 2], [1.0; 2], [16; 2], 0.2, 8)?;
+    let scheme = DcPse::<Gradient<2>, 2>::new();
+    let silent = Silent(Nearest::build(&set, &channel([Face::MirrorEven; 2])?, 20)?);
+    let refused = miss(&scheme, &set, &silent).unwrap_err();
+    assert!(matches!(refused.kind(), ErrorKind::Solver(SolverError::UnknownImage { .. })), "{refused}");
+    // Without images there is nothing to know.
+    let open = |of: Nearest<2>| miss(&scheme, &set, &Silent(of));
+    let nearest = Nearest::build(&set, &Domain::open(), 20)?;
+    assert_eq!(open(nearest.clone())?, miss(&scheme, &set, &nearest)?);
+    Ok(())
+}
+
+#[test]
 fn signs_of_the_field_at_a_mirror_are_not_those_of_the_velocity() -> Result<()> {
     let set = Particles::lattice([0.0; 2], [1.0; 2], [40; 2])?;
     let pse = Pse::new(Gradient::<2>, 2, set.spacing()?.epsilon(2.0)?, set.volumes()?)?;

@@ -132,6 +132,14 @@ fn limits_of_upwind_and_diffusion_are_sharp() -> Result<()> {
     let sharp = 1.1707 * h;
     assert!(amplification(upwind()?, N, Euler::new(), 0.99 * sharp)? <= 1.0 + 1e-10);
     assert!(amplification(upwind()?, N, Euler::new(), 1.01 * sharp)? > 1.0 + 1e-6);
+    // In the limit of small h/epsilon 2/sqrt(pi) epsilon/v, which is reached at h/epsilon = 1/2.
+    let limit = 2.0 / std::f64::consts::PI.sqrt() * 2.0 * h;
+    let wide = || -> Result<_> {
+        let gradient = UpwindGradient::new(set.spacing()?.epsilon(2.0)?, set.volumes()?).support(6.0)?;
+        Ok(AdvectionDiffusion::<1>::new().advection([1.0], gradient))
+    };
+    assert!(amplification(wide()?, N, Euler::new(), 0.99 * limit)? <= 1.0 + 1e-10);
+    assert!(amplification(wide()?, N, Euler::new(), 1.01 * limit)? > 1.0 + 1e-6);
     for order in [2, 4, 6, 8] {
         let overlap = if order == 8 { 2.0 } else { 1.5 };
         let laplacian = Pse::new(Laplacian::<1>, order, set.spacing()?.epsilon(overlap)?, set.volumes()?)?;

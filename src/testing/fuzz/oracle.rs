@@ -12,6 +12,7 @@ use crate::stencil::Neighbor;
 pub(super) struct Oracle<const D: usize> {
     rows: Vec<Vec<(f64, Neighbor<D>)>>,
     sources: usize,
+    domain: Domain<D>,
     particles: bool,
     cutoff: f64,
 }
@@ -41,7 +42,7 @@ impl<const D: usize> Oracle<D> {
             }
             rows.push(row);
         }
-        Ok(Self { rows, sources: sources.len(), particles, cutoff })
+        Ok(Self { rows, sources: sources.len(), domain: *domain, particles, cutoff })
     }
 
     pub(super) fn row(&self, p: usize) -> impl Iterator<Item = &Neighbor<D>> {
@@ -72,6 +73,10 @@ impl<const D: usize> Neighbors<D> for Oracle<D> {
 
     fn generation(&self) -> u64 {
         0
+    }
+
+    fn domain(&self) -> Option<&Domain<D>> {
+        Some(&self.domain)
     }
 
     fn for_each(&self, p: usize, cutoff: f64, mut visit: impl FnMut(Neighbor<D>)) {
