@@ -7,7 +7,7 @@ use crate::sets::Set;
 const EVEN: f64 = 0.1;
 const ODD: f64 = 0.2;
 /// How far the order in L-inf may stay below, and any order above, on sets that are no lattice.
-const LINF: f64 = 0.35;
+pub const LINF: f64 = 0.35;
 const ABOVE_EVEN: f64 = 0.5;
 const ABOVE_ODD: f64 = 1.2;
 /// How far the order at faces may stay below in one and two dimensions, and in three.

@@ -2,7 +2,7 @@
 //!
 //! How it is measured, and the bands, are those of the example `orders`.
 
-use crate::bands::Band;
+use crate::bands::{Band, LINF};
 use crate::measure::{OfDegree, Series, observe};
 use crate::sets::Set;
 use parops::{Field, Laplacian, Operator, testing::Promise};
@@ -30,7 +30,7 @@ fn holds<const D: usize, const K: usize, T: Field>(
                 "face" => Promise::new("Orders", format!("DC-PSE, order at faces{dimensions} less r"))
                     .at_least(low - r, value - r),
                 "L-inf" if low.is_finite() && high.is_finite() => {
-                    Promise::new("Orders", "DC-PSE, L-inf order less r").within(low - r, high - r, value - r);
+                    Promise::new("Orders", "DC-PSE, L-inf order less r").within(-LINF, high - r, value - r);
                 }
                 _ => {}
             }
