@@ -168,8 +168,9 @@ fn in_order(mut matrix: CsrMatrix<f64>) -> Result<(CsrMatrix<f64>, Vec<u32>)> {
     order.extend((0..n as u32).filter(|&row| weak[row as usize]));
     let mut last = Vec::new();
     for row in 0..n {
-        let (mut to, past) = (matrix.offsets[row], matrix.offsets[row + 1]);
-        for at in to..past {
+        let range = matrix.offsets[row]..matrix.offsets[row + 1];
+        let mut to = range.start;
+        for at in range.clone() {
             let entry = (matrix.columns[at], matrix.values[at]);
             if weak[entry.0 as usize] {
                 last.push(entry);
@@ -178,7 +179,7 @@ fn in_order(mut matrix: CsrMatrix<f64>) -> Result<(CsrMatrix<f64>, Vec<u32>)> {
                 to += 1;
             }
         }
-        for (at, entry) in (to..past).zip(last.drain(..)) {
+        for (at, entry) in (to..range.end).zip(last.drain(..)) {
             (matrix.columns[at], matrix.values[at]) = entry;
         }
     }

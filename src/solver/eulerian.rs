@@ -57,9 +57,10 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     /// Makes the rows of the scene on these particles; the run starts at t = 0.
     ///
     /// # Errors
-    /// As [`SemiDiscrete::new`]; [`SolverError::Growing`] where modes grow whatever the step, as those of central schemes on
-    /// scattered particles without enough diffusion; [`SolverError::Unstable`] where no step is stable for a term, such as explicit Euler with
-    /// a central scheme for the advection.
+    /// As [`SemiDiscrete::new`]; [`SolverError::Growing`](crate::SolverError::Growing) where modes grow whatever the
+    /// step, as those of central schemes on scattered particles without enough diffusion;
+    /// [`SolverError::Unstable`](crate::SolverError::Unstable) where no step is stable for a term, such as explicit
+    /// Euler with a central scheme for the advection.
     pub fn new<P: Neighbors<D>>(scene: S, particles: &Particles<D>, neighbors: &P, stepper: St) -> Result<Self> {
         Self::with_policy(scene, particles, neighbors, stepper, StepPolicy::default(), GrowthPolicy::default())
     }
@@ -112,7 +113,7 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     /// methods that are exact on scattered particles do not conserve. What sources and boundaries add counts as drift.
     ///
     /// # Errors
-    /// [`SolverError::Budget`] where it is not positive.
+    /// [`SolverError::Budget`](crate::SolverError::Budget) where it is not positive.
     pub fn drift_budget(mut self, budget: f64) -> Result<Self> {
         self.ledger.budget = check_budget(budget)?;
         Ok(self)
@@ -205,9 +206,11 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     /// Advances u by one step.
     ///
     /// # Errors
-    /// [`SolverError::Limit`] for a step above the limit, [`SolverError::Substeps`] where cutting it does not help;
-    /// [`SolverError::Drift`] above the [`drift_budget`](Self::drift_budget); [`TimeError::NotFinite`] with particle, stage and time; as [`TimeScheme::step`] and [`SemiDiscrete::rate`]. Field and
-    /// run are then as they were.
+    /// [`SolverError::Limit`](crate::SolverError::Limit) for a step above the limit,
+    /// [`SolverError::Substeps`](crate::SolverError::Substeps) where cutting it does not help;
+    /// [`SolverError::Drift`](crate::SolverError::Drift) above the [`drift_budget`](Self::drift_budget);
+    /// [`TimeError::NotFinite`] with particle, stage and time; as [`TimeScheme::step`] and [`SemiDiscrete::rate`].
+    /// Field and run are then as they were.
     pub fn step(&mut self, u: &mut Vec<S::Value>, dt: f64) -> Result<&LedgerRow<D>> {
         self.step_to(u, dt, self.t + dt)
     }

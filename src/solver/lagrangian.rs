@@ -74,11 +74,12 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
     /// Puts the scene on these particles, which have the values u; the run starts at t = 0.
     ///
     /// # Errors
-    /// [`ParticleError::NoVolumes`](crate::ParticleError::NoVolumes) without volumes; [`TimeError::Shape`] for another
-    /// number of values; [`DomainError::Outside`](crate::DomainError::Outside) naming a particle outside the domain; as
+    /// [`ParticleError::NoVolumes`](crate::ParticleError::NoVolumes) without volumes;
+    /// [`TimeError::Shape`](crate::TimeError::Shape) for another number of values;
+    /// [`DomainError::Outside`](crate::DomainError::Outside) naming a particle outside the domain; as
     /// [`MovingDiffusion::start`], [`MovingDiffusion::check`] and [`MovingDiffusion::spectrum`];
-    /// [`SolverError::Unstable`] where no step is stable for a term; [`SolverError::Growing`] where modes of the diffusion
-    /// term grow.
+    /// [`SolverError::Unstable`] where no step is stable for a term; [`SolverError::Growing`] where modes of the
+    /// diffusion term grow.
     pub fn new(scene: S, particles: &Particles<D>, u: &[S::Value], domain: &Domain<D>, stepper: St) -> Result<Self> {
         Self::with_settings(scene, particles, u, domain, stepper, MovingSettings::default())
     }

@@ -160,6 +160,14 @@ fn steps_above_the_limit_are_refused_cut_or_taken_as_the_policy_says() -> Result
     // Times differ by rounding, the steps are the same five.
     assert!(apart < 1e-12 && hand.ledger().step == 5 && hand.ledger().retries == 0, "{apart}");
 
+    // What is exactly legal in so many parts takes no more of them, wherever the clock stands.
+    for t in [0.0, 0.3, 1000.0] {
+        for most in 2..60 {
+            let (mut run, mut u) = (start(StepPolicy::Adapt { most })?.at(t), wave(&particles));
+            assert_eq!(run.step(&mut u, f64::from(most) * limit)?.substeps, most, "from {t}");
+        }
+    }
+
     let mut run = start(StepPolicy::Allow)?;
     for _ in 0..60 {
         run.step(&mut u, dt)?;

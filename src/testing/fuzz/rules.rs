@@ -53,7 +53,7 @@ impl<const D: usize> Scene<D> {
                 return Some((0, cutoff));
             }
         }
-        if !(LENGTH_LOW <= cutoff && cutoff <= LENGTH_HIGH) {
+        if !(LENGTH_LOW..=LENGTH_HIGH).contains(&cutoff) {
             return Some((0, cutoff));
         }
         let coordinates =
