@@ -141,8 +141,15 @@ fn lines_that_are_none_are_refused() {
     assert!(Verification::from_lines([]).unwrap_err().contains("no promise"));
     assert!(Verification::from_lines(["A\tonly\tthree"]).unwrap_err().contains("not six fields"));
     assert!(Verification::read(&PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("no such folder")).is_err());
-    // Of lines with the same promise and test the last counts.
+    // Of lines with the same promise and test the last counts, unless one is broken.
     let later = LINES[0].replace("held", "broken");
     assert_eq!(Verification::from_lines([LINES[0], &later]).unwrap().broken().count(), 1);
-    assert_eq!(Verification::from_lines([later.as_str(), LINES[0]]).unwrap().broken().count(), 0);
+    assert_eq!(Verification::from_lines([later.as_str(), LINES[0]]).unwrap().broken().count(), 1);
+}
+
+#[test]
+fn promises_that_differ_in_a_fraction_are_two() {
+    let jitters = ["A\tjitter 0.05\t<= 1\t2\tbroken\tt::one", "A\tjitter 0.5\t<= 1\t0.5\theld\tt::one"];
+    let shown = Verification::from_lines(jitters).unwrap();
+    assert_eq!((shown.broken().count(), shown.to_string().lines().count()), (1, 6));
 }
