@@ -27,7 +27,7 @@ pub struct Ilu0 {
     factors: CsrMatrix<f64>,
     /// The place of the diagonal entry of each row.
     diagonal: Vec<usize>,
-    /// The rows in the order of their elimination.
+    /// The rows in the order of their elimination; empty where that is their own.
     order: Vec<u32>,
 }
 
@@ -44,7 +44,7 @@ impl Ilu0 {
         diagonal.resize(n, 0);
         // place[q] is where column q stands in the row at work.
         let mut place = vec![usize::MAX; n];
-        for row in order.iter().map(|&row| row as usize) {
+        for row in (0..n).map(|i| eliminated(&order, i)) {
             let range = factors.offsets[row]..factors.offsets[row + 1];
             let mut largest = 0.0_f64;
             for at in range.clone() {
@@ -91,7 +91,7 @@ impl Ilu0 {
             let entries = factors.columns[from..to].iter().zip(&factors.values[from..to]);
             entries.fold(0.0, |sum, (&q, value)| sum + value * x[q as usize])
         };
-        let rows = order.iter().map(|&row| (row as usize, diagonal[row as usize]));
+        let rows = (0..diagonal.len()).map(|i| eliminated(order, i)).map(|row| (row, diagonal[row]));
         for (row, own) in rows.clone() {
             x[row] -= sum(factors.offsets[row], own, x);
         }
@@ -113,7 +113,7 @@ impl Ilu0 {
                 x[q as usize] -= value * y;
             }
         };
-        let rows = order.iter().map(|&row| (row as usize, diagonal[row as usize]));
+        let rows = (0..diagonal.len()).map(|i| eliminated(order, i)).map(|row| (row, diagonal[row]));
         for (row, own) in rows.clone() {
             x[row] /= factors.values[own];
             spread(own + 1, factors.offsets[row + 1], x[row], x);
@@ -153,6 +153,12 @@ fn with_diagonal(matrix: &CsrMatrix<f64>) -> Result<CsrMatrix<f64>> {
     Ok(full)
 }
 
+/// The row that is eliminated as number i.
+#[inline(always)]
+fn eliminated(order: &[u32], i: usize) -> usize {
+    order.get(i).map_or(i, |&row| row as usize)
+}
+
 /// The order of elimination, weak rows last, and the matrix with the columns of every row in that order.
 fn in_order(mut matrix: CsrMatrix<f64>) -> Result<(CsrMatrix<f64>, Vec<u32>)> {
     let n = matrix.rows();
@@ -163,6 +169,9 @@ fn in_order(mut matrix: CsrMatrix<f64>) -> Result<(CsrMatrix<f64>, Vec<u32>)> {
             values.iter().any(|value| value.abs() > own)
         })
         .collect();
+    if !weak.contains(&true) {
+        return Ok((matrix, Vec::new()));
+    }
     let mut order: Vec<u32> = reserved(n)?;
     order.extend((0..n as u32).filter(|&row| !weak[row as usize]));
     order.extend((0..n as u32).filter(|&row| weak[row as usize]));
