@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use parops::{
-    AdvectionDiffusion, Boundary, BoundaryCondition, CellList, DcPse, Domain, Euler, Eulerian, Gradient,
-    ImplicitScheme, Laplacian, Ledger, Limit, Nearest, Particles, Pse, Result, Rk4, Scene, SspRk3, Steady, TimeScheme,
-    testing::Promise,
+    AdvectionDiffusion, Allowance, Boundary, BoundaryCondition, CellList, DcPse, Domain, Euler, Eulerian, Gradient,
+    ImplicitScheme, Laplacian, Ledger, Limit, Nearest, Particles, Pse, Random, Result, Rk4, Scene, SspRk3, Steady,
+    TimeScheme, Volumes, testing::Promise,
 };
 
 fn scattered(n: usize) -> Result<(Particles<2>, Nearest<2>)> {
@@ -37,6 +37,26 @@ fn symmetric_exchange_conserves_over_ten_thousand_steps() -> Result<()> {
         mass.at_most(1e-12, totals.drift.abs() / totals.size);
     }
     assert_eq!(run.ledger().step, 10_000);
+    Ok(())
+}
+
+#[test]
+fn symmetric_exchange_conserves_on_scattered_particles_of_unequal_volumes() -> Result<()> {
+    let mut random = Random::new(4);
+    let volumes = (0..100).map(|_| 0.01 * (0.5 + random.uniform())).collect();
+    let set = Particles::jittered([0.0; 2], [1.0; 2], [10; 2], 0.3, 4)?.with_volumes(Volumes::each(volumes)?)?;
+    // Its moments are far off, its symmetry is not.
+    let epsilon = parops::Spacing(0.1).epsilon(1.2)?;
+    let pse = Pse::new(Laplacian::<2>, 2, epsilon, set.volumes()?)?.allow(Allowance::Everywhere);
+    let neighbors = CellList::build(&set, &Domain::periodic([0.0; 2], [1.0; 2])?, pse.cutoff())?;
+    let mut run = Eulerian::new(AdvectionDiffusion::<2>::new().diffusion(0.01, pse), &set, &neighbors, Rk4::new())?;
+    let mut u: Vec<f64> = (0..100).map(|_| random.uniform() - 0.3).collect();
+    let dt = 0.9 * run.longest_step(&u)?;
+    for _ in 0..10_000 {
+        run.step(&mut u, dt)?;
+        let totals = &run.ledger().fields[0];
+        assert!(totals.drift.abs() <= 1e-12 * totals.size, "{totals:?}");
+    }
     Ok(())
 }
 
