@@ -47,7 +47,7 @@ fn symmetric_exchange_conserves_on_scattered_particles_of_unequal_volumes() -> R
     let set = Particles::jittered([0.0; 2], [1.0; 2], [10; 2], 0.3, 4)?.with_volumes(Volumes::each(volumes)?)?;
     // Its moments are far off, its symmetry is not.
     let epsilon = parops::Spacing(0.1).epsilon(1.2)?;
-    let pse = Pse::new(Laplacian::<2>, 2, epsilon, set.volumes()?)?.allow(Allowance::Everywhere);
+    let pse = Pse::new(Laplacian::<2>, 2, epsilon, set.volumes()?)?.support(4.0)?.allow(Allowance::Everywhere);
     let neighbors = CellList::build(&set, &Domain::periodic([0.0; 2], [1.0; 2])?, pse.cutoff())?;
     let mut run = Eulerian::new(AdvectionDiffusion::<2>::new().diffusion(0.01, pse), &set, &neighbors, Rk4::new())?;
     let mut u: Vec<f64> = (0..100).map(|_| random.uniform() - 0.3).collect();
