@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 use std::cell::RefCell;
-use std::fmt::Debug;
+use std::fmt::{Debug, Display};
 use std::fs::{OpenOptions, create_dir_all};
 use std::io::Write;
 use std::path::PathBuf;
@@ -34,6 +34,7 @@ pub struct Promise {
     text: Cow<'static, str>,
     unit: Option<(&'static str, f64)>,
     aim: Option<(f64, &'static str)>,
+    case: Option<String>,
 }
 
 /// The worst of a promise so far, and its bound.
@@ -51,12 +52,18 @@ thread_local! {
 impl Promise {
     /// A promise of a section of the table.
     pub fn new(section: &'static str, text: impl Into<Cow<'static, str>>) -> Self {
-        Self { section, text: text.into(), unit: None, aim: None }
+        Self { section, text: text.into(), unit: None, aim: None, case: None }
     }
 
     /// Bounds are multiples of `size`, called `name` in the table.
     pub fn in_units(mut self, name: &'static str, size: f64) -> Self {
         self.unit = Some((name, size));
+        self
+    }
+
+    /// Which of the many cases of one promise this is: said where it is broken, not in the table.
+    pub fn case(mut self, name: impl Display) -> Self {
+        self.case = Some(name.to_string());
         self
     }
 
@@ -101,14 +108,20 @@ impl Promise {
     pub fn equal<T: PartialEq + Debug + ?Sized>(&self, left: &T, right: &T) {
         let held = left == right;
         self.line(|| "equal".into(), 0.0, || if held { "equal" } else { "differs" }.into(), held, false);
-        assert!(held, "{}: {}\n left: {left:?}\nright: {right:?}", self.section, self.text);
+        assert!(held, "{}\n left: {left:?}\nright: {right:?}", self.name());
     }
 
     /// It is so.
     #[track_caller]
     pub fn holds(&self, held: bool) {
         self.line(|| "always".into(), 0.0, || if held { "always" } else { "not always" }.into(), held, false);
-        assert!(held, "{}: {}", self.section, self.text);
+        assert!(held, "{}", self.name());
+    }
+
+    /// Section, promise and case, for the message of a broken one.
+    fn name(&self) -> String {
+        let case = self.case.as_ref().map(|case| format!(" ({case})")).unwrap_or_default();
+        format!("{}: {}{case}", self.section, self.text)
     }
 
     fn size(&self) -> f64 {
@@ -125,7 +138,7 @@ impl Promise {
         // Nothing in units of nothing is nothing.
         let [badness, measured] = [badness, measured].map(|x| if held && x.is_nan() { 0.0 } else { x });
         self.line(bound, badness, || two_digits(measured), held, missed);
-        assert!(held, "{}: {}: {measured:e} is not {}", self.section, self.text, bound());
+        assert!(held, "{}: {measured:e} is not {}", self.name(), bound());
     }
 
     /// Writes a line if it is the first or the worst of its promise in this test.

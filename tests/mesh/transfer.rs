@@ -89,9 +89,8 @@ fn depositing_conserves_all_moments_the_kernel_promises() {
                 nodes.nodes().map(term).sum::<f64>()
             };
             let size: f64 = strengths.iter().zip(&points).map(each).sum();
-            let _ = name;
             let moments = Promise::new("Conservation", "moments to the exactness under deposition, every kernel");
-            moments.in_units("eps sum abs", f64::EPSILON * size).at_most(64.0, (before - after).abs());
+            moments.case(name).in_units("eps sum abs", f64::EPSILON * size).at_most(64.0, (before - after).abs());
         }
     }
     for centering in [Centering::Nodes, Centering::Cells] {

@@ -107,7 +107,7 @@ fn gradient_on_jittered_sets_of_fixed_overlap_has_a_plateau_or_diverges() -> Fai
         // f_q - f_p leaves the defect of the first moment, of size one; the sum leaves M_0 f/epsilon.
         let (difference, defect) = ratio(SphForm::Difference)?;
         assert!(defect > 0.01, "{name}: {defect}");
-        let order = |text| Promise::new("Orders", text);
+        let order = |text| Promise::new("Orders", text).case(name);
         order("compact SPH gradient on jittered sets, differences").within(-0.35, 0.35, difference);
         let (summation, _) = ratio(SphForm::Summation)?;
         order("compact SPH gradient on jittered sets, sums").within(-1.35, -0.65, summation);
@@ -123,8 +123,8 @@ fn gradient_on_jittered_sets_converges_where_the_overlap_grows() -> Failure {
         // epsilon ~ h^(1/2): the defect of the first moment falls like (h/epsilon)^2 or so, mollification like h.
         let at = |n: usize, overlap| error(&kernel, &jittered(n, 5), [1, 0], overlap, SphForm::Difference);
         let order = (at(20, 2.0)? / at(80, 4.0)?).ln() / 4.0_f64.ln();
-        let _ = name;
-        Promise::new("Orders", "compact SPH gradient on jittered sets, growing overlap").within(0.5, 1.7, order);
+        let promise = Promise::new("Orders", "compact SPH gradient on jittered sets, growing overlap");
+        promise.case(name).within(0.5, 1.7, order);
         Ok(())
     }
     for_all!(converges, 2);

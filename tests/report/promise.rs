@@ -44,6 +44,7 @@ fn every_verb_records_bound_value_verdict_and_test() {
         Promise::new("A", "no longer short").short_of(1.0, "too slow").at_most(2.0, 0.5);
         Promise::new("A", "equal").equal(&[1, 2][..], &[1, 2]);
         Promise::new("A", "holds").holds(true);
+        Promise::new("A", "case").case("one of many").at_most(1.0, 0.5);
         return;
     };
     let expected = [
@@ -56,6 +57,7 @@ fn every_verb_records_bound_value_verdict_and_test() {
         "no longer short\t<= 2, aim 1\t0.50\theld",
         "equal\tequal\tequal\theld",
         "holds\talways\talways\theld",
+        "case\t<= 1\t0.50\theld",
     ];
     let test = "report::promise::every_verb_records_bound_value_verdict_and_test";
     assert_eq!(text.lines().collect::<Vec<_>>(), expected.map(|line| format!("A\t{line}\t{test}")));
@@ -95,6 +97,20 @@ fn repeated_promises_keep_the_worst_and_one_bound() {
     };
     assert_eq!((last("repeated"), last("repeated from below")), ("999".into(), "0".into()));
     assert!(text.lines().count() < 50, "{text}");
+}
+
+#[test]
+fn broken_promises_name_their_case() {
+    if env::var_os(CHILD).is_some() {
+        return;
+    }
+    let message = |promise: fn(&Promise)| {
+        let broken = panic::catch_unwind(move || promise(&Promise::new("A", "short").case("third")));
+        *broken.unwrap_err().downcast::<String>().unwrap()
+    };
+    assert_eq!(message(|promise| promise.at_most(0.5, 0.75)), "A: short (third): 7.5e-1 is not <= 0.5");
+    assert_eq!(message(|promise| promise.holds(false)), "A: short (third)");
+    assert!(message(|promise| promise.equal(&1, &2)).starts_with("A: short (third)\n"));
 }
 
 /// Lines of a small table; the digits of the last are not in order of text.
