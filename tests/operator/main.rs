@@ -4,11 +4,13 @@
 mod cases;
 
 mod anisotropic;
+mod by_hand;
 mod checker;
 mod div_grad;
 mod expression;
 mod invariance;
 mod one_sided;
+mod one_sided_rows;
 mod order;
 mod pse;
 mod sph;
