@@ -5,7 +5,9 @@ mod cases;
 
 mod anisotropic;
 mod by_hand;
+mod certificates;
 mod checker;
+mod diffusivity_rows;
 mod div_grad;
 mod expression;
 mod invariance;
