@@ -182,8 +182,9 @@ impl Promise {
     }
 }
 
-/// A number without loss, and short where it can be.
+/// A number to 15 digits, and short where it can be: the digits beyond are the rounding of a computed bound.
 fn number(x: f64) -> String {
+    let x = format!("{x:.14e}").parse().unwrap_or(x);
     if x == 0.0 || (1e-3..1e5).contains(&x.abs()) { format!("{x}") } else { format!("{x:e}") }
 }
 
