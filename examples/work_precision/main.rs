@@ -122,7 +122,7 @@ fn write(choice: &Choice, bench: &Bench) -> Result<(), Box<dyn Error>> {
         page.figure(scene, &fs::read_to_string(path)?)?;
     }
     for (scene, holds, text) in &bench.claims {
-        page.note(scene, &format!("{}: {text}", if *holds { "holds" } else { "FAILS" }));
+        page.note(scene, &format!("{}: {text}", if *holds { "holds" } else { "FAILS" }))?;
     }
     page.write(&mut file("report.html")?)?;
     println!("written to {}", choice.out.display());
