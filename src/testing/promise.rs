@@ -188,8 +188,9 @@ fn is_finite<const N: usize>(numbers: [f64; N]) -> bool {
     numbers.iter().all(|x| x.is_finite())
 }
 
-/// A number without loss, and short where it can be.
+/// A number to 15 digits, and short where it can be: the digits beyond are the rounding of a computed bound.
 fn number(x: f64) -> String {
+    let x = format!("{x:.14e}").parse().unwrap_or(x);
     if x == 0.0 || (1e-3..1e5).contains(&x.abs()) { format!("{x}") } else { format!("{x:e}") }
 }
 

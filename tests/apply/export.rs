@@ -4,6 +4,7 @@ use crate::full;
 use parops::{
     Apply, CellList, CsrMatrix, Cutoff, D1, D2, DcPse, Domain, ErrorKind, Euler, Face, Field, Gradient, Laplacian,
     LinearError, MultiIndexError, Outputs, Particles, Plan, Pse, Random, Result, Rk4, Rows, Stepper, integrate,
+    testing::Promise,
 };
 
 fn jittered(n: usize, seed: u64) -> Result<Particles<2>> {
@@ -65,9 +66,10 @@ fn matrix_is_the_operator<const K: usize, T: Field>(rows: &Rows<[f64; K], T>) ->
                 let w: f64 = w[k].as_();
                 size += w.abs() * (f[q as usize].as_().abs() + own.map_or(0.0, f64::abs));
             }
-            let bound = 2.0 * (row.sources.len() + 4) as f64 * eps * size;
             let miss: f64 = (direct[p][k] - product[p]).as_();
-            assert!(miss.abs() <= bound, "row {p}: {miss:e} > {bound:e}");
+            let acts = Promise::new("Exports", "CSR matrices act as the rows they are made of, f64 and f32");
+            let unit = (row.sources.len() + 4) as f64 * eps * size;
+            acts.case(format!("row {p}")).in_units("(n + 4) eps sum abs", unit).at_most(2.0, miss.abs());
         }
     }
     Ok(())
@@ -206,6 +208,10 @@ fn read<T: Field>(text: &str, parse: impl Fn(&str) -> T) -> Result<CsrMatrix<T>>
     CsrMatrix::from_triplets(sizes[0], sizes[1], entries)
 }
 
+fn read_back() -> Promise {
+    Promise::new("Exports", "matrices read back from Matrix Market text, bits")
+}
+
 #[test]
 fn matrix_read_back_from_matrix_market_has_equal_bits() -> Result<()> {
     let (gradient, _) = torus(12)?;
@@ -215,12 +221,12 @@ fn matrix_read_back_from_matrix_market_has_equal_bits() -> Result<()> {
         let mut text = Vec::new();
         matrix.write_matrix_market(&mut text)?;
         let again = read(std::str::from_utf8(&text).unwrap(), |word| word.parse::<f64>().unwrap())?;
-        assert_eq!(again, matrix);
+        read_back().equal(&again, &matrix);
     }
     let short = CsrMatrix::from_triplets(1, 3, [(0, 0, 0.1_f32), (0, 1, f32::MAX), (0, 2, -1e-45)])?;
     let mut text = Vec::new();
     short.write_matrix_market(&mut text)?;
-    assert_eq!(read(std::str::from_utf8(&text).unwrap(), |word| word.parse::<f32>().unwrap())?, short);
+    read_back().equal(&read(std::str::from_utf8(&text).unwrap(), |word| word.parse::<f32>().unwrap())?, &short);
     Ok(())
 }
 
@@ -318,10 +324,11 @@ mod saved {
     fn equal_bits<const K: usize, T: Field + Serialize + DeserializeOwned>(rows: &Rows<[f64; K], T>) {
         let again = reloaded(rows);
         let (a, b) = (rows.raw(), again.raw());
-        assert_eq!((a.offsets, a.columns), (b.offsets, b.columns));
+        let same = || Promise::new("Reproducibility", "rows saved and reloaded, bits");
+        same().equal(&(a.offsets, a.columns), &(b.offsets, b.columns));
         let bits = |w: &[[T; K]]| -> Vec<u64> { w.as_flattened().iter().map(|&w| AsF64::of(w).to_bits()).collect() };
-        assert_eq!(bits(a.weights), bits(b.weights));
-        assert_eq!(bits(a.diagonal), bits(b.diagonal));
+        same().equal(&bits(a.weights), &bits(b.weights));
+        same().equal(&bits(a.diagonal), &bits(b.diagonal));
         assert!((0..=rows.targets()).all(|p| rows.center(p) == again.center(p)));
         assert_eq!((rows.sources(), rows.report()), (again.sources(), again.report()));
     }
@@ -421,8 +428,10 @@ mod saved {
             let mut rows = rows.clone();
             assert!(serde_json::from_value::<Rows<[f64; 2]>>(rows.clone()).is_ok());
             change(&mut rows);
-            let error = serde_json::from_value::<Rows<[f64; 2]>>(rows).unwrap_err().to_string();
-            assert!(error.contains(reason), "change {i}: {error}");
+            let refused = serde_json::from_value::<Rows<[f64; 2]>>(rows);
+            let error = refused.err().map(|error| error.to_string()).unwrap_or_default();
+            let named = Promise::new("Input", "files of rows that were tampered with are refused by what is wrong");
+            named.case(format!("change {i}: {error}")).holds(error.contains(reason));
         }
         // A number that f64 holds and f32 does not.
         let mut large = on.clone();

@@ -36,6 +36,10 @@ fn refused(points: Vec<[f64; 2]>, epsilon: f64, volume: f64) -> Error {
     error
 }
 
+fn input(text: &'static str) -> Promise {
+    Promise::new("Input", text)
+}
+
 fn is_moment(error: &Error) -> bool {
     matches!(error.kind(), ErrorKind::Operator(OperatorError::Moment { defect, limit }) if defect > limit)
 }
@@ -59,7 +63,9 @@ fn degenerate_sets_are_refused_by_their_moments_and_never_panic() {
         ("two sets far apart", vec![[0.0, 0.0], [0.05, 0.0], [1e12, 0.0], [1e12, 0.05]]),
     ] {
         let error = refused(points, 2.0 * h, h * h);
-        assert!(is_moment(&error) && error.particle().is_some(), "{name}: {error}");
+        input("coincident, collinear and scattered sets are refused by their moments, with a particle")
+            .case(format!("{name}: {error}"))
+            .holds(is_moment(&error) && error.particle().is_some());
     }
 }
 
@@ -93,18 +99,19 @@ fn kernel_narrower_than_the_gaps_or_wider_than_its_cutoff_is_refused() -> Result
 
 #[test]
 fn illegal_numbers_are_refused_at_the_door() {
+    let refused = || input("illegal epsilon, volumes, orders and signs give errors with particle and numbers");
     for bad in [0.0, -1.0, f64::INFINITY] {
-        assert_eq!(Epsilon::global(bad).unwrap_err(), Error::from(ParticleError::Epsilon { epsilon: bad }));
+        refused().equal(&Epsilon::global(bad).unwrap_err(), &Error::from(ParticleError::Epsilon { epsilon: bad }));
         let each = Epsilon::each(vec![1.0, bad]).unwrap_err();
-        assert_eq!(each, Error::from(ParticleError::Epsilon { epsilon: bad }).at(1));
+        refused().equal(&each, &Error::from(ParticleError::Epsilon { epsilon: bad }).at(1));
         let volumes = Volumes::each(vec![1.0, 1.0, bad]).unwrap_err();
-        assert_eq!(volumes, Error::from(ParticleError::Volume { volume: bad }).at(2));
+        refused().equal(&volumes, &Error::from(ParticleError::Volume { volume: bad }).at(2));
     }
     assert!(Epsilon::global(f64::NAN).is_err() && Volumes::equal(f64::NAN).is_err());
     let (epsilon, volumes) = (Epsilon::global(0.1).unwrap(), Volumes::equal(0.01).unwrap());
     for order in [0, 1, 3, 10] {
         let error = Pse::new(Laplacian::<2>, order, epsilon.clone(), &volumes).unwrap_err();
-        assert_eq!(*error.kind(), ErrorKind::Kernel(KernelError::Order { order }));
+        refused().equal(error.kind(), &ErrorKind::Kernel(KernelError::Order { order }));
     }
     let high = Expression::new([(MultiIndex::new([255, 255]), 1.0)]).unwrap();
     let error = Pse::new(high, 8, epsilon.clone(), &volumes).unwrap_err();
@@ -113,9 +120,9 @@ fn illegal_numbers_are_refused_at_the_door() {
         ErrorKind::Kernel(KernelError::Overflow { .. }) | ErrorKind::MultiIndex(MultiIndexError::Degree { .. })
     ));
     let even = laplacian(0.1, &volumes).sign(Sign::Plus).unwrap_err();
-    assert_eq!(*even.kind(), ErrorKind::Operator(OperatorError::PlusEven { degree: 2 }));
+    refused().equal(even.kind(), &ErrorKind::Operator(OperatorError::PlusEven { degree: 2 }));
     let bare = Particles::new(vec![[0.0, 0.0]; 3]).unwrap();
-    assert_eq!(bare.volumes().unwrap_err(), Error::from(ParticleError::NoVolumes { count: 3 }));
+    refused().equal(&bare.volumes().unwrap_err(), &Error::from(ParticleError::NoVolumes { count: 3 }));
 }
 
 #[test]
@@ -136,7 +143,8 @@ fn lists_of_the_user_s_own_are_refused_before_an_operator_sees_them() {
         (vec![Neighbor { sign: 0, ..near }], NeighborError::Sign { q: 1, sign: 0 }),
     ];
     for (neighbors, due) in due {
-        assert_eq!(row(&neighbors), Error::from(due).at(0));
+        input("faulty lists of neighbors give errors with target and numbers")
+            .equal(&row(&neighbors), &Error::from(due).at(0));
     }
     let nan = row(&[Neighbor { separation: [f64::NAN, 0.0], ..near }]);
     assert!(
@@ -150,10 +158,6 @@ fn rows() -> (Particles<2>, Rows, CellList<2>, Pse<parops::Exchange<2>>) {
     let pse = laplacian(0.096, particles.volumes().unwrap()).support(5.0).unwrap();
     let neighbors = CellList::build(&particles, &torus(), pse.cutoff()).unwrap();
     (particles, pse.assemble(&neighbors).unwrap(), neighbors, pse)
-}
-
-fn unchanged(text: &'static str) -> Promise {
-    Promise::new("Input", text)
 }
 
 #[test]
@@ -170,7 +174,7 @@ fn wrong_lengths_and_fields_that_are_no_numbers_change_nothing() {
         ] {
             let mut out = vec![42.0; n];
             assert_eq!(operator.apply(f, &mut out).unwrap_err(), Error::from(due));
-            unchanged("refused applications write nothing").holds(out.iter().all(|&x| x == 42.0));
+            input("refused applications write nothing").holds(out.iter().all(|&x| x == 42.0));
         }
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             // Two bad values: the first is named, and its neighbors are not.
@@ -182,7 +186,7 @@ fn wrong_lengths_and_fields_that_are_no_numbers_change_nothing() {
             assert!(
                 matches!(*error.kind(), ErrorKind::Apply(ApplyError::Field { value }) if value.to_bits() == bad.to_bits())
             );
-            unchanged("refused applications write nothing").holds(out.iter().all(|&x| x == 42.0));
+            input("refused applications write nothing").holds(out.iter().all(|&x| x == 42.0));
         }
     }
 }
@@ -621,7 +625,7 @@ fn illegal_steps_and_right_hand_sides_leave_state_and_operator_as_they_were() {
             |_: f64, _: &Field, _: &mut Field| -> Result<()> { std::panic::resume_unwind(Box::new("mine")) };
         let caught = catch_unwind(AssertUnwindSafe(|| stepper.step(0.0, 1e-3, &mut u, &mut panics)));
         assert!(caught.is_err());
-        unchanged("refused and panicking steps leave state and rows").equal(&(&u, &rows), &(&start, &kept));
+        input("refused and panicking steps leave state and rows").equal(&(&u, &rows), &(&start, &kept));
         let mut fresh = start.clone();
         stepper.step(0.0, 1e-4, &mut u, &mut diffuse).unwrap();
         stepper.reset();
@@ -645,7 +649,7 @@ fn step_above_the_limit_is_refused_before_the_first_evaluation_unless_allowed() 
         };
         let error = integrate(&mut stepper, &mut u, &plan, &mut rhs, |_, _, _| {}).unwrap_err();
         assert_eq!(*error.kind(), ErrorKind::Time(TimeError::Limit { dt: plan.dt(), limit: largest }));
-        unchanged("a step above the limit is refused before the first evaluation").equal(&u, &start);
+        input("a step above the limit is refused before the first evaluation").equal(&u, &start);
         let run = integrate(&mut stepper, &mut u, &plan.policy(Policy::Allow), &mut rhs, |_, _, _| {})?;
         assert!(!run.within_limit && calls > 0);
     }

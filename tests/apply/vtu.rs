@@ -1,7 +1,7 @@
 //! Files of particles: what a reader of its own finds in them, and what is refused.
 
 use crate::full;
-use parops::{Error, IoError, Particles, Pvd, Random, Result, Vtu, VtuValues};
+use parops::{Error, IoError, Particles, Pvd, Random, Result, Vtu, VtuValues, testing::Promise};
 
 /// An element of a file: its name behind those around it, its attributes, and the text in it.
 #[derive(Debug)]
@@ -192,12 +192,13 @@ fn fields_read_back_have_equal_bits() -> Result<()> {
         assert_eq!(names, ["scalar", "vector", "one", "three", "nine", "short", "short vector"]);
         let scalars: Vec<[f64; 1]> = scalar.iter().map(|&x| [x]).collect();
         let wanted = [bits(&scalars, 1), bits(&vector, 3), bits(&one, 1), bits(&three, 3), bits(&nine, 9)];
+        let same = || Promise::new("Exports", "fields read back from VTU files, bits, f64 and f32");
         for (field, wanted) in fields.iter().zip(wanted) {
-            assert_eq!(field.doubles(), wanted, "{}", field.get("Name"));
+            same().case(field.get("Name")).equal(&field.doubles(), &wanted);
         }
-        assert_eq!(fields[5].singles(), short.iter().map(|x| vec![x.to_bits()]).collect::<Vec<_>>());
+        same().equal(&fields[5].singles(), &short.iter().map(|x| vec![x.to_bits()]).collect::<Vec<_>>());
         let wanted: Vec<_> = short_vector.iter().map(|[x, y]| vec![x.to_bits(), y.to_bits(), 0]).collect();
-        assert_eq!(fields[6].singles(), wanted);
+        same().equal(&fields[6].singles(), &wanted);
     }
     Ok(())
 }
@@ -226,7 +227,7 @@ fn refused_field_is_a_typed_error_and_leaves_the_file_as_it_was() -> Result<()> 
     let refused = |name: &str, values: VtuValues| {
         let mut vtu = vtu.clone();
         let error = vtu.field(name, values).unwrap_err();
-        assert_eq!(written(&vtu).unwrap(), before);
+        Promise::new("Input", "refused fields leave a VTU file as it was").equal(&written(&vtu).unwrap(), &before);
         error
     };
 
@@ -290,7 +291,8 @@ fn series_read_back_has_equal_times_and_names() -> Result<()> {
             .map(|element| (element.get("timestep").parse::<f64>().unwrap().to_bits(), element.get("file")))
             .collect();
         assert!(elements[2..].iter().all(|element| element.path == "VTKFile/Collection/DataSet"));
-        assert_eq!(found, entries[..count].iter().map(|(time, name)| (time.to_bits(), *name)).collect::<Vec<_>>());
+        let wanted: Vec<_> = entries[..count].iter().map(|(time, name)| (time.to_bits(), *name)).collect();
+        Promise::new("Exports", "times and names read back from PVD files, bits").equal(&found, &wanted);
         series.push(*time, name)?;
     }
     Ok(())

@@ -120,7 +120,7 @@ fn derived_kernels_equal_the_golden_table_exactly() {
     fn check<const P: usize, const R: usize, const S: usize>() {
         let table = &golden()["kernels"][format!("Lambda_{P}_{R}")];
         let pieces = pieces(&Lambda::<P, R>::new().unwrap());
-        let exactly = Promise::new("Kernels in ulps", "Lambda coefficients against the table, as fractions");
+        let exactly = Promise::new("Kernels", "Lambda coefficients against the table, as fractions");
         let read = |key: &str| -> Vec<Polynomial> {
             table[key].as_array().unwrap().iter().map(|c| c.as_array().unwrap().iter().map(exact).collect()).collect()
         };
@@ -224,7 +224,7 @@ fn weights_add_up_to_one_within_four_eps_in_both_precisions() {
         let kernel = Lambda::<P, R>::new().unwrap();
         let double = worst_sum::<f64, S>(&kernel, f64::EPSILON, |x| x);
         let single = worst_sum::<f32, S>(&kernel, f32::EPSILON.into(), f64::from);
-        let sum = Promise::new("Kernels in ulps", "sum of Lambda weights less 1, f64 and f32").in_units("eps", 1.0);
+        let sum = Promise::new("Kernels", "sum of Lambda weights less 1, f64 and f32").in_units("eps", 1.0);
         sum.at_most(LIMIT, double.max(single));
     }
     each_golden!(check);

@@ -45,6 +45,7 @@ fn every_verb_records_bound_value_verdict_and_test() {
         Promise::new("A", "equal").equal(&[1, 2][..], &[1, 2]);
         Promise::new("A", "holds").holds(true);
         Promise::new("A", "case").case("one of many").at_most(1.0, 0.5);
+        Promise::new("A", "computed bound").at_most(0.1 + 0.2, 0.25);
         return;
     };
     let expected = [
@@ -58,6 +59,7 @@ fn every_verb_records_bound_value_verdict_and_test() {
         "equal\tequal\tequal\theld",
         "holds\talways\talways\theld",
         "case\t<= 1\t0.50\theld",
+        "computed bound\t<= 0.3\t0.25\theld",
     ];
     let test = "report::promise::every_verb_records_bound_value_verdict_and_test";
     assert_eq!(text.lines().collect::<Vec<_>>(), expected.map(|line| format!("A\t{line}\t{test}")));

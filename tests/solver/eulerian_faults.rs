@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use parops::{
     AdvectionDiffusion, ApplyError, Boundary, BoundaryCondition, BoundaryError, CellList, DcPse, Domain, ErrorKind,
     Euler, Eulerian, Gradient, GrowthPolicy, ImplicitScheme, Laplacian, Leapfrog, Ledger, Limit, Mean, Nearest,
-    Particles, Pse, Result, Rk4, Rkl2, SolverError, StepPolicy, TimeError,
+    Particles, Pse, Result, Rk4, Rkl2, SolverError, StepPolicy, TimeError, testing::Promise,
 };
 
 fn set(n: usize) -> Result<(Particles<2>, Nearest<2>)> {
@@ -98,7 +98,8 @@ fn illegal_steps_and_fields_are_refused() -> Result<()> {
     let before = bits(&u);
     for dt in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let error = run.step(&mut u, dt).err().unwrap();
-        assert!(matches!(error.kind(), ErrorKind::Time(TimeError::Step { .. })), "{error}");
+        let step = matches!(error.kind(), ErrorKind::Time(TimeError::Step { .. }));
+        Promise::new("Input", "steps that are not positive numbers are refused").case(error).holds(step);
     }
     assert!(run.advance(&mut u, -1.0, 0.1).is_err());
     let mut short = vec![1.0; 99];
@@ -108,7 +109,8 @@ fn illegal_steps_and_fields_are_refused() -> Result<()> {
     broken[5] = f64::INFINITY;
     let error = run.step(&mut broken, 1e-3).err().unwrap();
     assert_eq!((error.particle(), broken[5]), (Some(5), f64::INFINITY));
-    assert_eq!((bits(&u), run.time(), run.ledger().step), (before, 0.0, 0));
+    Promise::new("Input", "refused steps leave field, time and ledger as they were")
+        .equal(&(bits(&u), run.time(), run.ledger().step), &(before, 0.0, 0));
 
     let other = Particles::jittered([0.0; 2], [1.0; 2], [10; 2], 0.2, 9)?;
     let error = Eulerian::new(diffusion(0.01), &other, &neighbors, Rk4::new()).err().unwrap();

@@ -2,9 +2,10 @@
 
 use parops::{
     AdvectionDiffusion, CellList, DcPse, Domain, ErrorKind, Euler, Eulerian, Gradient, ImplicitScheme, Laplacian,
-    Limit, Nearest, Particles, Pse, Result, Rkl2, RowSymmetry, Scene, SolverError, SspRk3, StepLimit, StepPolicy,
-    UpwindGradient,
+    Limit, Nearest, Neighbors, Particles, Pse, Result, Rkl2, RowSymmetry, Scene, SolverError, SspRk3, StepLimit,
+    StepPolicy, UpwindGradient, testing::Promise,
 };
+use std::f64::consts::TAU;
 
 /// What one number per step is worth: dt in units of the longest step of explicit Euler.
 const NUMBER: f64 = 1e6;
@@ -97,5 +98,31 @@ fn peclet_numbers_of_a_million_run_upwind_and_name_what_binds() -> Result<()> {
     let gradient = Pse::new(Gradient::<1>, 2, ring.spacing()?.epsilon(1.5)?, volumes)?;
     let error = Eulerian::new(scene().advection([1.0], gradient), &ring, &neighbors, Euler::new()).err().unwrap();
     assert!(matches!(error.kind(), ErrorKind::Solver(SolverError::Unstable { term: Limit::Advection, .. })), "{error}");
+    Ok(())
+}
+
+#[test]
+fn upwind_steps_of_euler_make_no_new_extrema() -> Result<()> {
+    const STEPS: usize = 50;
+    let set = Particles::jittered([0.0; 2], [1.0; 2], [24; 2], 0.3, 9)?;
+    let upwind = UpwindGradient::new(set.spacing()?.epsilon(1.2)?, set.volumes()?);
+    let cutoff = upwind.cutoff();
+    let neighbors = CellList::build(&set, &Domain::periodic([0.0; 2], [1.0; 2])?, cutoff)?;
+    let terms = (0..set.len()).map(|p| neighbors.count(p, cutoff.0)).max().unwrap_or(0);
+    let swirl = |x: &[f64; 2], _: f64| [(TAU * x[1]).sin(), 0.5 - (TAU * x[0]).cos()];
+    let scene = AdvectionDiffusion::<2>::new().advection(swirl, upwind);
+    let mut run = Eulerian::new(scene, &set, &neighbors, Euler::new())?;
+    let mut u: Vec<f64> = set.points().iter().map(|x| f64::from(u8::from(x[0] < 0.5))).collect();
+    let extrema = |u: &[f64]| u.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), u| (a.min(*u), b.max(*u)));
+    for _ in 0..STEPS {
+        let (low, high) = extrema(&u);
+        let dt = run.longest_step(&u)?;
+        run.step(&mut u, dt)?;
+        let (lowest, highest) = extrema(&u);
+        // A step is a mean with weights that are not negative, and rounds as many terms as a row has.
+        Promise::new("Limits of steps", "upwind steps of Euler at their limit make no new extrema")
+            .in_units("n eps", terms as f64 * f64::EPSILON)
+            .at_most(1.0, (low - lowest).max(highest - high));
+    }
     Ok(())
 }
