@@ -13,6 +13,8 @@ mod figure;
 mod grid;
 #[path = "../options/mod.rs"]
 mod options;
+#[path = "../work_precision/tags.rs"]
+mod tags;
 
 use std::error::Error;
 use std::f64::consts::{PI, TAU};

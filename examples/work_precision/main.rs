@@ -42,6 +42,7 @@ mod sets;
 #[path = "../stiff_diffusion/setting.rs"]
 mod setting;
 mod stiff;
+mod tags;
 
 use std::error::Error;
 use std::fs::{self, File};
