@@ -36,6 +36,8 @@ const TITLES: [[&str; 2]; 2] = [
     ["jittered, h/epsilon kept", "jittered, h/epsilon falling"],
 ];
 
+const PHASES: &str = "Build makes kernels and checks every row, apply makes the rows again and applies them.";
+
 /// The two parts of a relative error in L2.
 struct Parts {
     mollification: f64,
@@ -45,6 +47,7 @@ struct Parts {
 pub fn run(bench: &mut Bench) -> Result<(), Box<dyn Error>> {
     let sides: &[usize] =
         if bench.quick { &[32, 128, 512, 2048] } else { &[32, 64, 128, 256, 512, 1024, 2048, 4096, 8192] };
+    bench.note(SCENE, PHASES);
     let mut panels: Vec<(Axes, Vec<Curve>)> = Vec::new();
     // The samples of the curves of each panel.
     let mut drawn: Vec<Vec<Series>> = Vec::new();
