@@ -1,6 +1,7 @@
 //! Compares VERIFICATION.md with the promises that tests have just recorded: exits with 1 where a promise, a bound, a
-//! verdict or the name of a test differs, or a promise is broken; measured values may differ. The page as it is now goes
-//! to the directory of `--out`, with `--record` to the root as well; `--quick` changes nothing.
+//! verdict or the name of a test differs, a promise is broken, or the page says anything else; measured values may differ
+//! within their bounds, and those that are worse by a factor of two are told. The page as it is now goes to the directory
+//! of `--out`, with `--record` to the root as well; `--quick` changes nothing.
 //!
 //! After `cargo test` and `cargo test --all-features`, both with `PAROPS_PROMISES=$PWD/target/promises`:
 //! `cargo run --release --all-features --example verification [-- --record]`
@@ -19,7 +20,8 @@ const HEAD: &str = "# Verification
 What parops promises, the bound, and the test that measures it. Cases of a property are random: a measured value is the
 worst of one run with 1000 cases, and moves within its bound. Written by
 `cargo run --release --all-features --example verification -- --record` after `cargo test` and
-`cargo test --all-features`, both with `PAROPS_PROMISES=$PWD/target/promises`; `.ci/run` compares all but measured values.
+`cargo test --all-features`, both with `PAROPS_PROMISES=$PWD/target/promises`; `.ci/run` compares all else,
+and measured values with their bounds.
 
 ";
 
@@ -52,11 +54,20 @@ fn run() -> Result<usize, Box<dyn Error>> {
     let page = format!("{HEAD}{shown}");
     fs::create_dir_all(&out)?;
     fs::write(out.join(PAGE), &page)?;
-    if record {
-        fs::write(root.join(PAGE), &page)?;
+    let before = fs::read_to_string(root.join(PAGE));
+    if let Ok(before) = &before {
+        shown.worsened(before).iter().for_each(|change| println!("worse, within its bound: {change}"));
     }
+    let stated = if record {
+        fs::write(root.join(PAGE), &page)?;
+        page
+    } else {
+        before.map_err(|error| format!("{PAGE}: {error}"))?
+    };
     let mut faults: Vec<String> = shown.broken().map(|promise| format!("broken: {promise}")).collect();
-    let stated = fs::read_to_string(root.join(PAGE)).map_err(|error| format!("{PAGE}: {error}"))?;
+    if !stated.starts_with(&format!("{HEAD}## ")) {
+        faults.push(format!("{PAGE} does not begin as it is written"));
+    }
     faults.extend(shown.differences(&stated));
     faults.iter().for_each(|fault| println!("{fault}"));
     println!("promises: {} faults", faults.len());

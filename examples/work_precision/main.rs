@@ -128,7 +128,7 @@ fn write(choice: &Choice, bench: &Bench) -> Result<(), Box<dyn Error>> {
         page.note(scene, text);
     }
     for (scene, holds, text) in &bench.claims {
-        page.note(scene, &format!("{}: {text}", if *holds { "holds" } else { "FAILS" }));
+        page.note(scene, &format!("{}: {text}", if *holds { "holds" } else { "FAILS" }))?;
     }
     page.write(&mut file("report.html")?)?;
     println!("written to {}", choice.out.display());

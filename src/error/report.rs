@@ -61,11 +61,13 @@ super::kinds! {
             /// Most runs.
             most: usize,
         } => "from {least} to {most} runs, where 1 and more are legal, and no more than the most",
-        /// A figure of a scene that has no samples.
+        /// A figure or a note of a scene that has no samples.
         NoSamples {
-            /// The figure, counted from 0.
-            figure: usize,
-        } => "figure {figure} is of a scene without samples",
+            /// Which of the two.
+            item: &'static str,
+            /// Its number among its kind, counted from 0.
+            place: usize,
+        } => "{item} {place} is of a scene without samples",
         /// A figure that is not one SVG element.
         NotSvg {
             /// The figure, counted from 0.

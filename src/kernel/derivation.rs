@@ -55,7 +55,7 @@ pub(super) fn radial(dim: usize, n: u32, j: u32, order: u32) -> Option<Vec<Ratio
     let conditions = j + order / 2 - u32::from(free);
     let twice_a = 2 * (n - 2 * j) + 2 * u32::from(free);
     let (row, multiple) = if free { (j - 1, j) } else { (j, 1) };
-    let power = Rational::integer(1_i128.checked_shl(n).filter(|_| n < 127)?.checked_mul(multiple.into())?);
+    let power = Rational::integer(2_i128.checked_pow(n)?.checked_mul(multiple.into())?);
     (0..conditions)
         .map(|k| {
             let mut sum = Rational::ZERO;

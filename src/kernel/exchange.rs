@@ -67,7 +67,7 @@ impl<const D: usize> Exchange<D> {
     ///
     /// It meets those that differ from some beta_i by even numbers: for each parity that occurs among the beta_i, with
     /// n odd exponents, C((m - n)/2 + D - 1, D - 1). Enough for any sum up to [`DEGREE_LIMIT`](Self::DEGREE_LIMIT) for
-    /// D <= 3, and for single multi-indices up to degree 32 for D = 4, 18 for D = 5 and 14 for D = 6.
+    /// D <= 3, and for single multi-indices up to degree 33 for D = 4, 21 for D = 5 and 15 for D = 6.
     pub const MONOMIAL_LIMIT: usize = 1024;
 
     /// The kernel of sum_i c_i D^beta_i to order r = `order`.

@@ -187,3 +187,26 @@ fn gaussian_constant<const D: usize>(a: f64) -> f64 {
     });
     high + low
 }
+
+#[cfg(test)]
+mod tests {
+    use super::gaussian_constant;
+    use super::twofold::Twofold;
+
+    #[test]
+    fn constants_of_gaussians_are_rounded_about_once_in_any_dimension() {
+        fn once<const D: usize>(a: f64) {
+            let constant = Twofold::from(gaussian_constant::<D>(a));
+            let square = (0..D).fold(constant * constant, |product, _| product * a.into());
+            // c^2 a^D - 1 is twice the relative error of c, which one rounding keeps to eps/2.
+            let off = (square - 1.0.into()).to_f64();
+            assert!(off.abs() <= 1.001 * f64::EPSILON, "D = {D}, a = {a}: {:.3} roundings", off / f64::EPSILON);
+        }
+        for a in (1..=200).map(|i| f64::from(i) * 0.1).chain([1.0, 2.0, 4.0].map(|n| n * std::f64::consts::PI)) {
+            once::<1>(a);
+            once::<2>(a);
+            once::<3>(a);
+            once::<8>(a);
+        }
+    }
+}

@@ -58,7 +58,7 @@ impl Rational {
         let zeros = mantissa.trailing_zeros();
         let odd = if x < 0.0 { -(mantissa >> zeros) } else { mantissa >> zeros };
         let exponent = exponent + i64::from(zeros);
-        let power = |e: i64| u32::try_from(e).ok().filter(|&e| e < 127).map(|e| 1_i128 << e);
+        let power = |e: i64| 2_i128.checked_pow(u32::try_from(e).ok()?);
         if exponent < 0 {
             Some(Self { numerator: odd, denominator: power(-exponent)? })
         } else {

@@ -3,7 +3,7 @@
 use super::monomials::{AddPowers, Monomials, polynomial};
 use super::nodes::{GROUP, Group, Nodes};
 use super::solver::{Rung, Solution, worst};
-use super::system::{MomentSystem, Residual};
+use super::system::{MomentSystem, Residual, larger};
 use super::triangle::{Layout, Pair};
 use super::window::Windows;
 use crate::lanes::{Lanes, Vectors, Work, widest};
@@ -247,7 +247,7 @@ impl<const D: usize> BatchSystem<D> {
         }
         let (start, odd) = layout.row(self.outputs);
         for (i, (pair, &norm)) in matrix[start..].iter_mut().zip(&norms[..self.conditions]).enumerate() {
-            // A start that is orthogonal to no coordinate direction and to no mean.
+            // A start that is orthogonal to no coordinate direction.
             let sign = if i % 2 == 0 { 1.0 } else { -1.0 };
             pair[odd] = Lanes::all(sign * (1.0 + 0.25 * (i % 3) as f64)) * norm;
         }
@@ -331,9 +331,7 @@ impl<const D: usize> BatchSystem<D> {
         }
         let mut miss = Lanes::ZERO;
         for (&sum, &b) in sums[self.offset..].iter().zip(self.required_of(k)) {
-            let here = (sum - Lanes::all(b)).abs();
-            // NaN must not hide behind a comparison.
-            miss = miss.zip(here, |miss, here| if !(here <= miss) { here } else { miss });
+            miss = miss.zip((sum - Lanes::all(b)).abs(), larger);
         }
         let terms = absolute.iter().fold(Lanes::ZERO, |terms, &sum| terms.zip(sum, f64::max));
         std::array::from_fn(|i| Residual { absolute: miss.0[i], terms: terms.0[i] })

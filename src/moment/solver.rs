@@ -1,6 +1,6 @@
 //! The seam of the solvers of moment systems.
 
-use super::system::{MomentSystem, Residual};
+use super::system::{MomentSystem, Residual, larger};
 use crate::error::Result;
 use crate::scalar::Scalar;
 
@@ -82,10 +82,9 @@ pub trait MomentSolver: Clone + Send + Sync + 'static {
     }
 }
 
-/// max over the outputs of their residuals, NaN being the largest.
+/// max over the outputs of their residuals.
 pub(super) fn worst<T: Scalar>(a: Residual<T>, b: Residual<T>) -> Residual<T> {
-    let larger = if a.absolute >= b.absolute || !a.absolute.is_finite() { a.absolute } else { b.absolute };
-    Residual { absolute: larger, terms: a.terms.max(b.terms) }
+    Residual { absolute: larger(a.absolute, b.absolute), terms: a.terms.max(b.terms) }
 }
 
 impl<T: Scalar> Solution<T> {
@@ -132,7 +131,7 @@ pub(super) fn condition<T: Scalar>(
 ) -> T {
     let mut extreme = |apply: &mut dyn FnMut(&mut [T]), steps: usize| {
         work.clear();
-        // A start that is orthogonal to no coordinate direction and to no mean.
+        // A start that is orthogonal to no coordinate direction.
         work.extend(
             (0..l).map(|i| T::lift(1.0 + 0.25 * (i % 3) as f64) * T::lift(if i % 2 == 0 { 1.0 } else { -1.0 })),
         );
@@ -149,3 +148,6 @@ pub(super) fn condition<T: Scalar>(
     let smallest = extreme(&mut solve, 2);
     (largest * smallest).sqrt()
 }
+
+#[cfg(test)]
+mod tests;

@@ -178,15 +178,17 @@ impl<T: Scalar, const D: usize> MomentSystem<T, D> {
         let mut residual = Residual { absolute: T::zero(), terms: T::zero() };
         for (j, &b) in self.required(k).iter().enumerate() {
             let (moment, terms) = self.moment(j, y);
-            let miss = (moment - b).abs();
-            // NaN must not hide behind a comparison.
-            if !(miss <= residual.absolute) {
-                residual.absolute = miss;
-            }
+            residual.absolute = larger(residual.absolute, (moment - b).abs());
             residual.terms = residual.terms.max(terms);
         }
         residual
     }
+}
+
+/// The larger of two misses; one that is no number is larger than all, and stays.
+#[inline(always)]
+pub(super) fn larger<T: Scalar>(a: T, b: T) -> T {
+    if a >= b || !a.is_finite() { a } else { b }
 }
 
 /// The power of two in (1/(2 x), 1/x], 1 for 0: scaling by it is exact.
@@ -203,4 +205,30 @@ fn power_of_two_below_inverse<T: Scalar>(x: T) -> T {
         scale *= two;
     }
     scale
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{larger, power_of_two_below_inverse};
+
+    #[test]
+    fn scales_are_powers_of_two_that_bring_norms_between_one_half_and_one() {
+        let mantissas = [1.0, 1.0_f64.next_up(), 1.3, 1.5, 2.0_f64.next_down()];
+        for x in (-300..300).flat_map(|exponent| mantissas.map(|x| x * 2.0_f64.powi(exponent))) {
+            let scale = power_of_two_below_inverse(x);
+            assert!(0.5 < scale * x && scale * x <= 1.0, "{x:e}");
+            assert_eq!(scale.to_bits() << 12, 0, "{x:e}");
+        }
+        assert_eq!([0.0, f64::NAN].map(power_of_two_below_inverse), [1.0; 2]);
+    }
+
+    #[test]
+    fn misses_that_are_no_numbers_do_not_hide_behind_later_ones() {
+        let largest = |misses: [f64; 3]| misses.into_iter().fold(0.0, larger);
+        assert_eq!(largest([1.0, 3.0, 2.0]), 3.0);
+        for bad in [f64::NAN, f64::INFINITY] {
+            let all = [[bad, 1.0, 2.0], [1.0, bad, 2.0], [1.0, 2.0, bad]];
+            assert!(all.into_iter().all(|misses| !largest(misses).is_finite()));
+        }
+    }
 }

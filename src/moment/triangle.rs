@@ -171,3 +171,6 @@ impl Layout {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

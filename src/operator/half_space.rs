@@ -129,16 +129,16 @@ impl<const D: usize> HalfScratch<D> {
     pub(super) fn slope(&mut self, axis: usize, side: Side) -> Result<()> {
         let Self { z, volume, w, defect } = self;
         let sign = side.sign();
-        let mut sources = 0;
+        let mut empty = true;
         for ((w, z), &volume) in w.iter_mut().zip(z.iter()).zip(volume.iter()) {
             let along = sign * z[axis];
             *w = 0.0;
             if along > 0.0 {
-                sources += 1;
+                empty = false;
                 *w = volume * along * (-square(z)).exp();
             }
         }
-        if sources == 0 {
+        if empty {
             return Err(OperatorError::EmptySide { axis, side, neighbors: z.len() }.into());
         }
         if D > 1
@@ -167,6 +167,7 @@ fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
 /// sum_q g_q exp(2 c . z), is least, by Newton's method from zero. `None` where |c| would exceed its limit.
 fn center<const D: usize>(axis: usize, z: &[[f64; D]], g: &[f64]) -> Option<[f64; D]> {
     let mut c = [0.0; D];
+    let (mut longest, mut last) = (LONGEST, SMatrix::<f64, D, 1>::zeros());
     for _ in 0..STEPS {
         let (mut total, mut size) = (0.0, 0.0);
         let mut first = SMatrix::<f64, D, 1>::zeros();
@@ -191,8 +192,13 @@ fn center<const D: usize>(axis: usize, z: &[[f64; D]], g: &[f64]) -> Option<[f64
         let mut spread = (second / total - mean * mean.transpose()) * 2.0;
         spread[(axis, axis)] = 1.0;
         let step = spread.try_inverse()? * mean;
-        // Half an epsilon a step at most, so that a step too far does not end the search.
-        let shorter = 1.0_f64.min(LONGEST / step.norm());
+        // Half an epsilon a step at most, so that a step too far does not end the search; less after a step back, so that
+        // sources in two groups far apart do not send it to and fro.
+        if step.dot(&last) < 0.0 {
+            longest *= 0.5;
+        }
+        last = step;
+        let shorter = 1.0_f64.min(longest / step.norm());
         c.iter_mut().zip(step.iter()).for_each(|(c, step)| *c -= shorter * step);
         if !(dot(&c, &c) <= FARTHEST * FARTHEST) {
             return None;

@@ -120,3 +120,95 @@ impl<M: Method<D>, S: Screen<D>, const D: usize> Method<D> for Screened<'_, M, S
         self.method.stand_in(draft, scratch);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::ParticleError;
+    use crate::operator::{DcPse, DivGrad, Laplacian};
+    use crate::stencil::Neighbor;
+
+    /// Neighbors in a spiral around target p, turned a little for each.
+    fn stencil(p: usize) -> Stencil<2> {
+        let mut stencil = Stencil::default();
+        stencil.reset(p, Some(p), 2.0);
+        for q in 0..24_u32 {
+            let (sine, cosine) = (f64::from(q) + 0.1 * p as f64).sin_cos();
+            let radius = 0.3 + 0.03 * f64::from(q);
+            stencil.push(Neighbor { q: 10 + q as usize, separation: [radius * cosine, radius * sine], sign: 1 });
+        }
+        stencil
+    }
+
+    struct Without(usize);
+
+    impl Screen<2> for Without {
+        fn leaves_out(&self, p: usize) -> bool {
+            p == self.0
+        }
+    }
+
+    type Made = (Vec<[f64; 1]>, [f64; 1], RowReport);
+
+    fn single<M: Method<2, Out = [f64; 1]>>(method: &M, p: usize) -> Result<Made> {
+        let (row, mut scratch) = (stencil(p), method.scratch()?);
+        let (mut w, mut diagonal) = (vec![[f64::NAN]; row.len()], [f64::NAN]);
+        method.weights(&row, &mut scratch, &mut w, &mut diagonal)?;
+        let report = method.report(&row, &scratch, &w, &diagonal)?;
+        Ok((w, diagonal, report))
+    }
+
+    #[test]
+    fn rows_left_out_are_zero_and_all_others_those_of_the_method_alone_and_in_batches() -> Result<()> {
+        let method = DcPse::<Laplacian<2>, 2>::new();
+        let screened = Screened { method: &method, screen: Without(2) };
+        let drafts = |p| {
+            let mut draft = Draft { stencil: stencil(p), ..Draft::default() };
+            draft.clear();
+            draft
+        };
+        let mut batch: Vec<Draft<2, [f64; 1]>> = (0..5).map(drafts).collect();
+        screened.weights_batch(&mut batch, &mut screened.scratch()?);
+        for (p, draft) in batch.into_iter().enumerate() {
+            let made = single(&screened, p)?;
+            assert_eq!((draft.weights, draft.diagonal, draft.report?), made);
+            if p == 2 {
+                let (row, zeros) = (stencil(p), vec![[0.0]; 24]);
+                let known = RowReport::of(&row, &zeros, &[0.0]);
+                assert_eq!(made, (zeros, [0.0], known));
+            } else {
+                assert_eq!(made, single(&method, p)?);
+            }
+        }
+        let thin = OperatorError::TooFew { neighbors: 3, conditions: 5, needed: 5 };
+        for refusal in [thin, OperatorError::NoCenter { neighbors: 3 }].map(Error::from) {
+            assert_eq!(screened.can_grow(&refusal), method.can_grow(&refusal));
+        }
+        let method = DivGrad::new(method, vec![1.0; 5])?;
+        let screened = Screened { method: &method, screen: Without(2) };
+        assert_eq!(screened.validate(5, 6), Err(ParticleError::Length { found: 5, needed: 6 }.into()));
+        Ok(())
+    }
+
+    #[test]
+    fn rows_facing_a_side_are_refused_below_half_of_their_neighbors_there() {
+        let facing = |side, along: &[f64]| {
+            let mut row = Stencil::<2>::default();
+            row.reset(0, Some(0), 1.0);
+            along.iter().for_each(|&x| row.push(Neighbor { q: 1, separation: [0.5, x], sign: 1 }));
+            let known = RowReport { conditions: 7, ..RowReport::of(&row, &vec![[0.0]; row.len()], &[0.0]) };
+            Facing { axis: 1, side }.check(&row, known).map(|report| assert_eq!(report, known))
+        };
+        // Sources on the left have a separation above zero; one beside the target is on neither side.
+        for (side, sign) in [(Side::Left, 1.0), (Side::Right, -1.0)] {
+            assert_eq!(facing(side, &[sign, sign, -sign, 0.0]), Ok(()));
+            assert_eq!(facing(side, &[sign, sign, -sign]), Ok(()));
+            for (along, neighbors, needed) in
+                [(vec![sign, -sign, -sign], 1, 2), (vec![sign, sign, -sign, 0.0, -sign], 2, 3)]
+            {
+                let refused = OperatorError::TooFew { neighbors, conditions: 7, needed };
+                assert_eq!(facing(side, &along), Err(refused.into()));
+            }
+        }
+    }
+}

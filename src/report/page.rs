@@ -45,9 +45,13 @@ impl<'a> Page<'a> {
     }
 
     /// Adds a sentence to a scene, as text.
-    pub fn note(&mut self, scene: &str, text: &str) -> &mut Self {
+    ///
+    /// # Errors
+    /// [`ReportError::NoSamples`] for a scene the table has no samples of. The page is then as it was.
+    pub fn note(&mut self, scene: &str, text: &str) -> Result<&mut Self> {
+        self.check(scene, "note", self.notes.len())?;
         self.notes.push((scene.to_string(), text.to_string()));
-        self
+        Ok(self)
     }
 
     /// Adds a figure to a scene, put into the page as it is: one `<svg>` element of the caller's, whom the page trusts.
@@ -57,14 +61,20 @@ impl<'a> Page<'a> {
     /// with `<svg` and ends with `</svg>`, white space aside. The page is then as it was.
     pub fn figure(&mut self, scene: &str, svg: &str) -> Result<&mut Self> {
         let (figure, svg) = (self.figures.len(), svg.trim());
-        if !self.table.samples().iter().any(|sample| sample.scene == scene) {
-            return Err(ReportError::NoSamples { figure }.into());
-        }
+        self.check(scene, "figure", figure)?;
         if !(svg.starts_with("<svg") && svg.ends_with("</svg>")) {
             return Err(ReportError::NotSvg { figure }.into());
         }
         self.figures.push((scene.to_string(), svg.to_string()));
         Ok(self)
+    }
+
+    /// Refuses what would stand nowhere in the page.
+    fn check(&self, scene: &str, item: &'static str, place: usize) -> Result<()> {
+        match self.table.samples().iter().any(|sample| sample.scene == scene) {
+            true => Ok(()),
+            false => Err(ReportError::NoSamples { item, place }.into()),
+        }
     }
 
     /// Writes the page and flushes `out`.

@@ -53,20 +53,21 @@ impl Sample {
     }
 
     /// Sets both errors, relative: sqrt(sum (c - e)^2 / sum e^2) and max |c - e| / max |e| of computed values c and exact
-    /// ones e. Absolute where all e are zero.
+    /// ones e. Absolute where all e are zero; NaN, which no [`Table`](super::Table) takes, where there are not as many of
+    /// both, or none.
     pub fn errors(&mut self, computed: impl IntoIterator<Item = f64>, exact: impl IntoIterator<Item = f64>) {
-        let [mut squares, mut size, mut largest, mut highest] = [0.0_f64; 4];
-        for (computed, exact) in computed.into_iter().zip(exact) {
-            let error = (computed - exact).abs();
-            squares += error * error;
-            size += exact * exact;
-            // A maximum would drop NaN.
-            largest = if largest.is_nan() || error <= largest { largest } else { error };
-            highest = highest.max(exact.abs());
+        let [computed, exact]: [Vec<f64>; 2] = [computed.into_iter().collect(), exact.into_iter().collect()];
+        if computed.len() != exact.len() || exact.is_empty() {
+            [self.error_l2, self.error_linf] = [f64::NAN; 2];
+            return;
         }
-        let scaled = |error: f64, size: f64| if size > 0.0 { error / size } else { error };
-        self.error_l2 = scaled(squares, size).sqrt();
-        self.error_linf = scaled(largest, highest);
+        let errors: Vec<f64> = computed.iter().zip(&exact).map(|(computed, exact)| computed - exact).collect();
+        let relative = |norm: fn(&[f64]) -> f64| {
+            let (error, size) = (norm(&errors), norm(&exact));
+            if size > 0.0 { error / size } else { error }
+        };
+        self.error_l2 = relative(euclidean);
+        self.error_linf = relative(largest);
     }
 
     /// Whether both are of one scene, dimension, set, method, order, stepper and number type.
@@ -95,4 +96,18 @@ impl Sample {
         }
         label
     }
+}
+
+/// max |x|; a maximum of f64 would drop NaN.
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |largest: f64, x| if largest.is_nan() || x.abs() <= largest { largest } else { x.abs() })
+}
+
+/// sqrt(sum x^2), with no square that overflows or vanishes.
+fn euclidean(values: &[f64]) -> f64 {
+    let scale = largest(values);
+    if !(scale > 0.0 && scale.is_finite()) {
+        return scale;
+    }
+    scale * values.iter().map(|x| (x / scale).powi(2)).sum::<f64>().sqrt()
 }

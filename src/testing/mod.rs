@@ -9,6 +9,7 @@ mod mesh_kernel;
 mod method;
 mod method_fault;
 mod promise;
+mod promise_line;
 mod provider;
 mod sample;
 mod smoothing;

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::{env, thread};
 
-use super::verification::{BROKEN, Line};
+use super::promise_line::{BROKEN, Line};
 
 /// One promise and its bound: an assertion that leaves a line for a [`Verification`](super::Verification).
 ///
@@ -25,7 +25,7 @@ use super::verification::{BROKEN, Line};
 /// ```
 ///
 /// # Panics
-/// Every verb panics where its promise is broken or what it measured is not finite, and where promises are recorded and one
+/// Every verb panics where its promise is broken, or measured value, bound or unit is not finite, and where promises are recorded and one
 /// test states one of them with two bounds.
 #[derive(Clone, Debug)]
 #[must_use = "a promise is checked by a bound"]
@@ -77,7 +77,7 @@ impl Promise {
     #[track_caller]
     pub fn at_most(&self, bound: f64, measured: f64) {
         let size = self.size();
-        let held = measured.is_finite() && measured <= bound * size;
+        let held = is_finite([measured, bound * size]) && measured <= bound * size;
         let missed = self.aim.is_some_and(|(aim, _)| !(measured <= aim * size));
         let bound_text = || format!("<= {}", number(bound));
         self.record(bound_text, measured / size, measured / size, held, missed);
@@ -87,7 +87,7 @@ impl Promise {
     #[track_caller]
     pub fn at_least(&self, bound: f64, measured: f64) {
         let size = self.size();
-        let held = measured.is_finite() && measured >= bound * size;
+        let held = is_finite([measured, bound * size]) && measured >= bound * size;
         let missed = self.aim.is_some_and(|(aim, _)| !(measured >= aim * size));
         let bound_text = || format!(">= {}", number(bound));
         self.record(bound_text, -measured / size, measured / size, held, missed);
@@ -98,7 +98,8 @@ impl Promise {
     pub fn within(&self, low: f64, high: f64, measured: f64) {
         let size = self.size();
         let off = (measured / size - 0.5 * (low + high)).abs();
-        let held = measured.is_finite() && low * size <= measured && measured <= high * size;
+        let bounds = [low * size, high * size];
+        let held = is_finite([measured, bounds[0], bounds[1]]) && bounds[0] <= measured && measured <= bounds[1];
         let bound_text = || format!("{} to {}", number(low), number(high));
         self.record(bound_text, off, measured / size, held, false);
     }
@@ -180,6 +181,11 @@ impl Promise {
             worse
         })
     }
+}
+
+/// No promise is kept by a bound that excludes nothing.
+fn is_finite<const N: usize>(numbers: [f64; N]) -> bool {
+    numbers.iter().all(|x| x.is_finite())
 }
 
 /// A number without loss, and short where it can be.

@@ -4,57 +4,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::{fmt, fs, io};
 
-/// The verdict on a promise that is not kept.
-pub(super) const BROKEN: &str = "broken";
+use super::promise_line::{BROKEN, Line, Place};
 
-/// One promise, as a test showed it.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Line {
-    pub section: String,
-    pub promise: String,
-    pub bound: String,
-    pub measured: String,
-    pub verdict: String,
-    pub test: String,
-}
-
-/// Where a line stands in the table: numbers in the promise count as numbers, so that M2 comes before M10.
-type Place = (String, Vec<(String, u64)>, String, String);
-
-impl Line {
-    /// Fields between tabs.
-    pub(super) fn to_tsv(&self) -> String {
-        let fields = [&self.section, &self.promise, &self.bound, &self.measured, &self.verdict, &self.test];
-        for field in fields {
-            assert!(!field.contains(['\t', '\n', '|']), "no text for a table: {field:?}");
-        }
-        fields.map(String::as_str).join("\t")
-    }
-
-    fn from_fields(fields: &[&str]) -> Option<Self> {
-        let &[section, promise, bound, measured, verdict, test] = fields else { return None };
-        let [section, promise, bound, measured, verdict, test] =
-            [section, promise, bound, measured, verdict, test].map(Into::into);
-        Some(Self { section, promise, bound, measured, verdict, test })
-    }
-
-    fn place(&self) -> Place {
-        let mut parts = vec![];
-        let mut rest = self.promise.as_str();
-        while !rest.is_empty() {
-            let digits = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
-            let (text, tail) = rest.split_at(digits);
-            let end = tail.find(|c: char| !c.is_ascii_digit()).unwrap_or(tail.len());
-            parts.push((text.into(), tail[..end].parse().unwrap_or(0)));
-            rest = &tail[end..];
-        }
-        (self.section.clone(), parts, self.promise.clone(), self.test.clone())
-    }
-}
+/// The first lines of every table.
+const TITLES: [&str; 2] = ["| Promise | Bound | Measured | Verdict | Test |", "|---|---|---|---|---|"];
 
 /// Every promise that tests have shown, with bound, verdict and test; displayed as a page of Markdown tables.
 ///
-/// A page that was checked in is compared promise by promise; measured values are not compared.
+/// A page that was checked in is compared promise by promise; a measured value may differ within its bound.
 ///
 /// ```
 /// use parops::testing::Verification;
@@ -105,20 +62,27 @@ impl Verification {
         }
     }
 
-    /// Reads the tables of a page.
-    fn from_page(page: &str) -> Self {
-        let (mut found, mut section) = (Self::default(), "");
+    /// Reads the tables of a page, and adds what is neither title nor promise from the first section on.
+    fn from_page(page: &str, faults: &mut Vec<String>) -> Self {
+        let (mut found, mut section) = (Self::default(), None);
         for text in page.lines() {
             if let Some(title) = text.strip_prefix("## ") {
-                section = title.trim();
-            } else if let Some(row) = text.strip_prefix('|').and_then(|row| row.strip_suffix('|')) {
-                let mut fields = vec![section];
-                fields.extend(row.split('|').map(str::trim));
-                found.lines.extend(Line::from_fields(&fields).map(|line| (line.place(), line)));
+                section = Some(title);
+                continue;
+            }
+            let Some(section) = section else { continue };
+            if text.is_empty() || TITLES.contains(&text) {
+                continue;
+            }
+            match Line::from_row(section, text) {
+                Some(line) => {
+                    if found.lines.insert(line.place(), line.clone()).is_some() {
+                        faults.push(format!("stated twice: {line}"));
+                    }
+                }
+                None => faults.push(format!("no promise: \"{text}\"")),
             }
         }
-        // Titles and rules of the tables.
-        found.lines.retain(|_, line| line.test != "Test" && !line.test.starts_with("---"));
         found
     }
 
@@ -127,47 +91,53 @@ impl Verification {
         self.lines.values().filter(|line| line.verdict == BROKEN).map(ToString::to_string)
     }
 
-    /// What differs from a page in promises, bounds, verdicts and names of tests.
+    /// What differs from a page in promises, bounds, verdicts and names of tests; measured values of the page that its own
+    /// bounds exclude; and what is no promise behind the title of its first section.
     #[must_use]
     pub fn differences(&self, page: &str) -> Vec<String> {
-        let page = Self::from_page(page);
         let mut found = vec![];
+        let page = Self::from_page(page, &mut found);
         for (place, shown) in &self.lines {
-            match page.lines.get(place) {
-                None => found.push(format!("not in the page: {shown}")),
-                Some(stated) => {
-                    for (what, stated, shown_now) in
-                        [("bound", &stated.bound, &shown.bound), ("verdict", &stated.verdict, &shown.verdict)]
-                    {
-                        if stated != shown_now {
-                            found.push(format!("{what} was \"{stated}\", is \"{shown_now}\": {shown}"));
-                        }
-                    }
+            let Some(stated) = page.lines.get(place) else {
+                found.push(format!("not in the page: {shown}"));
+                continue;
+            };
+            for (what, stated, shown_now) in
+                [("bound", &stated.bound, &shown.bound), ("verdict", &stated.verdict, &shown.verdict)]
+            {
+                if stated != shown_now {
+                    found.push(format!("{what} was \"{stated}\", is \"{shown_now}\": {shown}"));
                 }
+            }
+            if stated.verdict != BROKEN && !stated.may_hold() {
+                found.push(format!("\"{}\" is stated for \"{}\": {shown}", stated.measured, stated.bound));
             }
         }
         let gone = page.lines.iter().filter(|(place, _)| !self.lines.contains_key(*place));
         found.extend(gone.map(|(_, stated)| format!("shown by no test: {stated}")));
         found
     }
-}
 
-impl fmt::Display for Line {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {} ({})", self.section, self.promise, self.test)
+    /// What a page states as measured and is now worse by a factor of two or more, within its bound.
+    pub fn worsened(&self, page: &str) -> Vec<String> {
+        let page = Self::from_page(page, &mut vec![]);
+        let both = self.lines.iter().filter_map(|(place, shown)| Some((page.lines.get(place)?, shown)));
+        let worse = both.filter(|(stated, shown)| shown.is_worse_by(2.0, stated));
+        worse.map(|(stated, shown)| format!("was {}, is {}: {shown}", stated.measured, shown.measured)).collect()
     }
 }
 
 impl fmt::Display for Verification {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut section = "";
-        for Line { section: own, promise, bound, measured, verdict, test } in self.lines.values() {
-            if own != section {
+        let [title, rule] = TITLES;
+        for line in self.lines.values() {
+            if line.section != section {
                 let gap = if section.is_empty() { "" } else { "\n" };
-                writeln!(f, "{gap}## {own}\n\n| Promise | Bound | Measured | Verdict | Test |\n|---|---|---|---|---|")?;
-                section = own;
+                writeln!(f, "{gap}## {}\n\n{title}\n{rule}", line.section)?;
+                section = &line.section;
             }
-            writeln!(f, "| {promise} | {bound} | {measured} | {verdict} | {test} |")?;
+            writeln!(f, "{}", line.to_row())?;
         }
         Ok(())
     }

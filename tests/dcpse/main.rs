@@ -20,6 +20,8 @@ mod named;
 mod order;
 mod relations;
 mod reproduction;
+mod rows;
 mod solvers;
 mod stencils;
 mod support;
+mod systems;

@@ -189,7 +189,7 @@ fn radii_whose_lattices_never_end_are_refused_and_others_are_not() {
         assert_eq!(zeroth::<D>(support, overlap_limit), Err(expected), "D = {D}");
     }
     // The radius, the diameter, its square and its cube overflow.
-    for support in [1.5e308, 8e307, 1e154, f64::INFINITY, 0.0, -1.0] {
+    for support in [1.5e308, 8e307, 1e154, 4e153, f64::INFINITY, 0.0, -1.0] {
         refused::<1>(support, 1.0);
         refused::<2>(support, 1.0);
     }
@@ -198,6 +198,7 @@ fn radii_whose_lattices_never_end_are_refused_and_others_are_not() {
     refused::<1>(5e-324, 5e-324);
     refused::<2>(6.0, f64::INFINITY);
     // Legal, though far too coarse for this kernel: no lattice can see it.
+    assert!(zeroth::<1>(3.8e153, 1.0).expect("an end").is_finite());
     assert!(zeroth::<1>(1e150, 1.0).expect("an end").is_finite());
     assert!(zeroth::<3>(1e100, 1e-300).expect("an end").is_finite());
 }
@@ -208,4 +209,70 @@ fn quadratures_of_too_many_points_are_refused() {
     let expected = KernelError::Points { points: 3_f64.powi(21), limit: 16777216.0 };
     assert_eq!(zeroth::<21>(6.0, 2.0 / 3.0), Err(ErrorKind::Kernel(expected)));
     assert!(zeroth::<12>(6.0, 2.0 / 3.0).is_err());
+}
+
+#[test]
+fn conditions_count_the_zeroth_moment_for_degree_zero_alone() {
+    let conditions = |degree, order| moment_conditions::<2>(degree, order).collect::<Vec<_>>();
+    for (degree, order) in [(0, 1), (0, 4), (1, 2), (2, 2), (3, 1)] {
+        let expected: Vec<_> = graded::<2>(u32::from(degree > 0), degree + order - 1).collect();
+        assert_eq!(conditions(degree, order), expected);
+    }
+    assert_eq!(conditions(0, 0), []);
+}
+
+/// 1 within a radius, and not a number beyond it.
+struct Ball {
+    terms: Vec<Term<1>>,
+    support: f64,
+    overlap_limit: f64,
+}
+
+impl Kernel<f64, 1> for Ball {
+    fn value(&self, z: &[f64; 1]) -> f64 {
+        if z[0].abs() <= 1.75 * self.support { 1.0 } else { f64::NAN }
+    }
+    fn terms(&self) -> &[Term<1>] {
+        &self.terms
+    }
+    fn order(&self) -> u32 {
+        2
+    }
+    fn support(&self) -> f64 {
+        self.support
+    }
+    fn overlap_limit(&self) -> f64 {
+        self.overlap_limit
+    }
+}
+
+#[test]
+fn quadrature_is_the_mean_over_two_lattices_to_the_edge_of_the_ball_and_not_beyond() {
+    // With R/h = n + 1/4 the nodes are 2 n + 1, and 2 n of the shifted lattice: h times their mean is 2 R exactly, and
+    // one node more or less would be a miss of h/2. The last lattice has the finest spacing above 2 R / (2^20 - 1).
+    let radius = 7.0;
+    for (n, halvings) in [(400_000, 5), (300_000, 0), (524_287, 1)] {
+        let h = radius / (f64::from(n) + 0.25);
+        let overlap_limit = 2.0 * h * 2.0_f64.powi(halvings);
+        let ball = Ball { terms: one([0]), support: radius / 1.75, overlap_limit };
+        let found = continuous_moment(&ball, MultiIndex::ZERO).expect("radii");
+        // Of sums of 2 n equal terms, one after another.
+        let rounding = 2.0 * f64::from(n) * f64::EPSILON * 2.0 * radius;
+        assert!((found.value - 2.0 * radius).abs() <= rounding, "{n}: {found:?}");
+        assert!((found.absolute - f64::from(2 * n + 1) * h).abs() <= rounding, "{n}: {found:?}");
+        assert!((found.error - h).abs() <= rounding, "{n}: {found:?}");
+    }
+    // A spacing below the finest is not tried.
+    let ball = Ball { terms: one([0]), support: 4.0, overlap_limit: 1e-9 };
+    let found = continuous_moment(&ball, MultiIndex::ZERO).expect("radii");
+    assert!((found.value - 14.0).abs() < 14.0 / 1048575.0, "{found:?}");
+}
+
+#[test]
+fn errors_of_quadratures_are_never_below_rounding() {
+    let kernel = Gaussian::<1>::new();
+    for n in [0, 2, 8, 20] {
+        let found = continuous_moment(&kernel, MultiIndex::new([n])).expect("radii");
+        assert!((f64::EPSILON..1e-13).contains(&(found.error / found.absolute)), "{n}: {found:?}");
+    }
 }

@@ -12,4 +12,5 @@ mod oracle;
 mod rational;
 mod rational_laplacian;
 mod smoothing;
+mod stated;
 mod values;

@@ -65,6 +65,26 @@ fn rational_overflow_and_division_by_zero_give_none() {
     for x in [f64::NAN, f64::INFINITY, f64::MAX, f64::MIN_POSITIVE] {
         assert_eq!(Rational::from_f64(x), None);
     }
+    let power = |e: i32| Rational::from_f64(2.0_f64.powi(e));
+    assert_eq!([power(126), power(-126)], [Some(Rational::integer(1 << 126)), Rational::new(1, 1 << 126)]);
+    assert_eq!([power(127), power(-127)], [None; 2]);
     assert!(tiny < Rational::ONE && Rational::integer(-1) < tiny && tiny < huge);
     assert_eq!(Rational::new(-6, 4).map(|x| x.to_string()), Some("-3/2".into()));
+    // A zero has no sign.
+    assert_eq!([Rational::new(0, -5), Rational::from_f64(-0.0)], [Some(Rational::ZERO); 2]);
+    assert_eq!(Rational::ZERO.to_f64().to_bits(), 0.0_f64.to_bits());
+}
+
+#[test]
+fn rational_beside_a_tie_of_doubles_rounds_away_from_it() {
+    // 53 bits, a half in the next, and what lies 11 bits lower or behind a third.
+    for (even, up) in [(1_i128 << 52, false), ((1 << 52) + 1, true)] {
+        let tie = 3 * ((even << 12) + (1 << 11));
+        let found = |n: i128| Rational::new(n, 3).expect("in range").to_f64();
+        let nearest = |up: bool| ((even + i128::from(up)) << 12) as f64;
+        assert_eq!([found(tie), found(-tie)], [nearest(up), -nearest(up)]);
+        for above in [1, 3, 4] {
+            assert_eq!([found(tie + above), found(tie - above)], [nearest(true), nearest(false)], "{above}");
+        }
+    }
 }

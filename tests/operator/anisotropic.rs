@@ -556,3 +556,18 @@ fn illegal_tensors_are_refused_by_particle_and_numbers() -> Failure {
     assert!(error.particle().is_some());
     Ok(())
 }
+
+#[test]
+fn tensors_may_miss_symmetry_by_a_rounding_of_their_largest_entry_at_any_scale() -> Failure {
+    for scale in [2.0_f64.powi(-300), 1.0, 2.0_f64.powi(300)] {
+        let made = |off: f64| {
+            let tensor = [[4.0 * scale, scale], [scale * (1.0 + off), scale]];
+            DivTensorGrad::new(DcPse::<Hessian<2>, 4>::new(), &[tensor])
+        };
+        // 16 eps of the largest entry is legal.
+        assert!(made(60.0 * f64::EPSILON).is_ok(), "{scale:e}");
+        let error = made(68.0 * f64::EPSILON).unwrap_err();
+        assert!(matches!(error.kind(), ErrorKind::Particle(ParticleError::Asymmetric { row: 0, column: 1, .. })));
+    }
+    Ok(())
+}

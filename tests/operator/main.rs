@@ -4,11 +4,15 @@
 mod cases;
 
 mod anisotropic;
+mod by_hand;
+mod certificates;
 mod checker;
+mod diffusivity_rows;
 mod div_grad;
 mod expression;
 mod invariance;
 mod one_sided;
+mod one_sided_rows;
 mod order;
 mod pse;
 mod sph;

@@ -3,9 +3,9 @@
 use std::f64::consts::{PI, TAU};
 
 use parops::{
-    Allowance, Apply, BruteForce, CellList, Cutoff, D2, Domain, Epsilon, Error, ErrorKind, Expression, Face, Gaussian,
-    Gradient, HighOrderGaussian, KernelError, Laplacian, Method, MultiIndex, Neighbors, OperatorError, Particles,
-    Random, Rows, SmoothingKernel, Sph, SphForm, Stencil, Volumes, testing::Promise,
+    Allowance, Apply, BruteForce, CellList, Cutoff, D2, Differentiated, Domain, Epsilon, Error, ErrorKind, Expression,
+    Face, Gaussian, Gradient, HighOrderGaussian, Kernel, KernelError, Laplacian, Method, MultiIndex, Neighbors,
+    OperatorError, Particles, Random, Rows, SmoothingKernel, Sph, SphForm, Stencil, Term, Volumes, testing::Promise,
 };
 
 type Failure = Result<(), Error>;
@@ -488,4 +488,20 @@ fn overlap_limit_is_that_of_the_smoothing_kernel() -> Failure {
         }
     }
     Ok(())
+}
+
+#[test]
+fn differentiated_kernel_keeps_order_support_and_overlap_limit_of_its_kernel() -> Failure {
+    fn keeps<W: SmoothingKernel<f64, 2> + Clone>(kernel: W) -> Failure {
+        let term = Term { index: MultiIndex::new([1, 1]), factor: 2.0 };
+        let differentiated = Differentiated::new(kernel.clone(), vec![term])?;
+        assert_eq!(differentiated.order(), kernel.order());
+        assert_eq!(differentiated.support(), kernel.support());
+        assert_eq!(differentiated.overlap_limit(), kernel.overlap_limit());
+        assert_eq!(differentiated.terms(), [term]);
+        assert_eq!(differentiated.value(&[0.3, -0.4]), 2.0 * kernel.derivative(term.index, &[0.3, -0.4])?);
+        Ok(())
+    }
+    keeps(Gaussian::<2>::new())?;
+    keeps(HighOrderGaussian::<2>::new(4)?)
 }

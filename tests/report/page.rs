@@ -31,7 +31,7 @@ fn html(page: &Page) -> String {
 fn text_is_escaped_wherever_it_stands() {
     let table = table();
     let mut page = Page::new(NASTY, &table);
-    page.fact(NASTY, NASTY).note(NASTY, NASTY).figure(NASTY, SVG).unwrap();
+    page.fact(NASTY, NASTY).note(NASTY, NASTY).unwrap().figure(NASTY, SVG).unwrap();
     let html = html(&page);
     assert!(!html.contains("<script"), "{html}");
     // Title twice, fact twice, heading, note, figure; the method as the cheapest for four errors and as a sample.
@@ -61,14 +61,16 @@ fn page_has_every_scene_sample_and_fact_and_loads_nothing() {
 }
 
 #[test]
-fn figures_without_scene_or_svg_are_refused() {
+fn figures_and_notes_without_scene_and_figures_that_are_no_svg_are_refused() {
     let table = table();
     let mut page = Page::new("title", &table);
     page.figure("second", SVG).unwrap();
     let before = html(&page);
     let refused = |result: parops::Result<&mut Page>| result.map(|_| ()).unwrap_err().kind().clone();
     let kind = refused(page.figure("third", SVG));
-    assert_eq!(kind, ErrorKind::Report(ReportError::NoSamples { figure: 1 }));
+    assert_eq!(kind, ErrorKind::Report(ReportError::NoSamples { item: "figure", place: 1 }));
+    let kind = refused(page.note("third", "FAILS"));
+    assert_eq!(kind, ErrorKind::Report(ReportError::NoSamples { item: "note", place: 0 }));
     for text in ["", "<p></p>", "<svg>", "</svg>"] {
         assert_eq!(refused(page.figure("second", text)), ErrorKind::Report(ReportError::NotSvg { figure: 1 }));
     }

@@ -72,12 +72,15 @@ fn broken_promises_are_recorded_before_they_panic() {
         assert!(broken(|| Promise::new("A", "within").within(1.0, 2.0, 2.5)));
         assert!(broken(|| Promise::new("A", "equal").equal(&1, &2)));
         assert!(broken(|| Promise::new("A", "holds").holds(false)));
+        assert!(broken(|| Promise::new("A", "no bound").at_most(f64::INFINITY, 1.0)));
+        assert!(broken(|| Promise::new("A", "no bound below").at_least(f64::NEG_INFINITY, 1.0)));
+        assert!(broken(|| Promise::new("A", "no unit").in_units("cond", f64::INFINITY).at_most(4.0, 1.0)));
         return;
     };
-    assert_eq!(text.lines().count(), 6);
+    assert_eq!(text.lines().count(), 9);
     assert!(text.lines().all(|line| line.split('\t').nth(4) == Some("broken")), "{text}");
     let found = Verification::from_lines(text.lines()).unwrap();
-    assert_eq!(found.broken().count(), 6);
+    assert_eq!(found.broken().count(), 9);
 }
 
 #[test]
@@ -126,7 +129,7 @@ fn pages_that_differ_in_anything_but_measured_values_are_found_out() {
     let shown = Verification::from_lines(LINES).unwrap();
     let page = format!("# Title\n\nText | with | bars |\n\n{shown}");
     assert_eq!(shown.differences(&page), [""; 0]);
-    assert_eq!(shown.differences(&page.replace("0.5", "0.75")), [""; 0]);
+    assert_eq!(shown.differences(&page.replace("| 0.5 |", "| 0.75 |")), [""; 0]);
     let order = ["small", "two", "again", "ten"].map(|test| page.find(&format!("t::{test} |")).unwrap());
     assert!(order[0] < order[2] && order[2] < order[1] && order[1] < order[3], "{page}");
 
@@ -150,6 +153,51 @@ fn pages_that_differ_in_anything_but_measured_values_are_found_out() {
     let fewer = Verification::from_lines(LINES[..3].iter().copied()).unwrap();
     assert_eq!(fewer.differences(&page), ["shown by no test: B: M2 two (t::again)"]);
     assert_eq!(shown.differences("").len(), 4);
+}
+
+#[test]
+fn pages_that_state_more_than_promises_or_what_their_bounds_exclude_are_found_out() {
+    let shown = Verification::from_lines(LINES).unwrap();
+    let page = format!("# Title\n\nText\n\n{shown}");
+    let ten = "| M10 ten | <= 1 | 0.5 | held | t::ten |";
+    let with = |line: &str| shown.differences(&page.replace(ten, &format!("{line}\n{ten}")));
+    assert_eq!(with("all is well"), ["no promise: \"all is well\""]);
+    for row in
+        ["| M9 nine | <= 1 | 0.5 | held |", "| M9 nine | <= 1 | 0.5 | held | t::nine | ", "|M9|<= 1|0.5|held|t::nine|"]
+    {
+        assert_eq!(with(row), [format!("no promise: \"{row}\"")]);
+    }
+    assert_eq!(with(ten), ["stated twice: B: M10 ten (t::ten)"]);
+    let measured = |value: &str| shown.differences(&page.replace("| 0.5 |", &format!("| {value} |"))).len();
+    // Two digits may lie beyond the bound by half of the second.
+    assert_eq!(["0.99", "1.0", "1.1", "99", "NaN", "low"].map(measured), [0, 0, 1, 1, 1, 1]);
+
+    let lines = ["A\tlow\t>= 2, aim 3\t2.5\tshort: slow\tt::low", "A\tband\t1.9 to 2.1\t2.0\theld\tt::band"];
+    let shown = Verification::from_lines(lines.into_iter().chain(LINES)).unwrap();
+    let page = shown.to_string();
+    assert_eq!(shown.differences(&page), [""; 0]);
+    for (from, to) in [
+        ("| 2.5 |", "| 1.8 |"),
+        ("| 2.0 |", "| 2.3 |"),
+        ("| 2.0 |", "| 1.7 |"),
+        ("| equal | equal |", "| equal | differs |"),
+    ] {
+        assert_eq!(shown.differences(&page.replacen(from, to, 1)).len(), 1, "{from} {to}");
+    }
+}
+
+#[test]
+fn values_worse_by_a_factor_of_two_are_told() {
+    let lines = ["A\tat most\t<= 9\t4.0\theld\tt::one", "A\tat least\t>= 1\t2.0\theld\tt::one"];
+    let shown = Verification::from_lines(lines).unwrap();
+    let page = shown.to_string();
+    let stated = |from: &str, to: &str| shown.worsened(&page.replace(from, to));
+    assert_eq!(stated("| 4.0 |", "| 2.1 |"), [""; 0]);
+    assert_eq!(stated("| 4.0 |", "| 2.0 |"), ["was 2.0, is 4.0: A: at most (t::one)"]);
+    assert_eq!(stated("| 4.0 |", "| 0 |").len(), 1);
+    assert_eq!(stated("| 4.0 |", "| 8.0 |"), [""; 0]);
+    assert_eq!(stated("| 2.0 |", "| 3.9 |"), [""; 0]);
+    assert_eq!(stated("| 2.0 |", "| 4.0 |"), ["was 4.0, is 2.0: A: at least (t::one)"]);
 }
 
 #[test]

@@ -50,12 +50,31 @@ fn order_is_observed_within_a_series_by_h_and_else_by_dt() {
 fn relative_errors_are_by_hand() {
     let mut sample = sample("a", 0.1, 0.0);
     sample.errors([1.0, 2.0, 3.0], [1.0, 2.5, 1.0]);
-    assert_eq!(sample.error_l2, (4.25_f64 / 8.25).sqrt());
+    assert!((sample.error_l2 - (4.25_f64 / 8.25).sqrt()).abs() < 4.0 * f64::EPSILON);
     assert_eq!(sample.error_linf, 2.0 / 2.5);
     sample.errors([3.0, -4.0], [0.0, 0.0]);
     assert_eq!((sample.error_l2, sample.error_linf), (5.0, 4.0));
     sample.errors([f64::NAN, 1.0], [1.0, 1.0]);
     assert!(sample.error_l2.is_nan() && sample.error_linf.is_nan());
+    sample.errors([1.0, 2e200], [1e200, 1e200]);
+    assert_eq!((sample.error_l2, sample.error_linf), (1.0, 1.0));
+    sample.errors([3e-200, 4e-200], [0.0, 0.0]);
+    assert!((sample.error_l2 - 5e-200).abs() < 1e-215);
+}
+
+#[test]
+fn values_without_their_exact_ones_have_no_error_and_are_refused() {
+    let mut table = Table::default();
+    for (computed, exact) in [(&[][..], &[1.0][..]), (&[1.0], &[1.0, 2.0]), (&[1.0, 2.0], &[1.0]), (&[], &[])] {
+        let mut new = sample("a", 0.1, 0.0);
+        new.errors(computed.iter().copied(), exact.iter().copied());
+        let refused = refusal(table.push(new));
+        assert!(
+            matches!(refused, ReportError::Value { column: "error_l2", value, .. } if value.is_nan()),
+            "{refused:?}"
+        );
+    }
+    assert!(table.samples().is_empty());
 }
 
 #[test]

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::{Batch, BatchScratch, BatchSystem};
 use crate::lanes::{Common, Vectors};
-use crate::moment::{MomentScratch, MomentSolver, MomentSystem, Qr, Rung, Solution, Window, Windows};
+use crate::moment::{Lu, MomentScratch, MomentSolver, MomentSystem, Qr, Rung, Solution, Window, Windows};
 use crate::multi_index::{MultiIndex, Term, graded};
 
 const RADIUS: f64 = 2.2;
@@ -182,6 +182,52 @@ fn check_solution<const D: usize>(degree: u32, order: u32, low: u32, window: Win
     // Both are backward stable in B; the constant covers the growth with n and l.
     let tolerance = 100.0 * f64::EPSILON * by_qr.condition * largest;
     assert!(w.iter().zip(&expected).all(|(w, expected)| (w - expected).abs() <= tolerance));
+}
+
+#[test]
+fn condition_does_not_depend_on_the_unit_of_length_and_is_never_above_the_true_one() {
+    fn check<const D: usize>(degree: u32, order: u32, low: u32, half: usize, seed: u64) {
+        let outputs = all_of_degree::<D>(degree);
+        let mut system = MomentSystem::new(&outputs, degree, order, low).expect("legal");
+        let batch = BatchSystem::new(&system);
+        let z = jittered::<D>(2 * system.conditions() + 1, half, seed);
+        let solve = |scale: f64| {
+            let scaled: Vec<[f64; D]> = z.iter().map(|z| z.map(|x| x * scale)).collect();
+            let mut w = vec![f64::NAN; outputs.len() * z.len()];
+            let windows = Windows { shape: Window::Wendland, radius: [1.1 * RADIUS * scale], middle: [[0.0; D]] };
+            let [solution] = batch.solve([&scaled], windows, &mut BatchScratch::default(), [&mut w]);
+            (solution.expect("sound"), w)
+        };
+        let (solution, w) = solve(1.0);
+        for exponent in [-40, -3, 1, 40] {
+            let scale = 2.0_f64.powi(exponent);
+            let (scaled, v) = solve(scale);
+            assert_eq!(scaled.condition, solution.condition, "{D} {degree} {order} {exponent}");
+            // A correction of some outputs depends on what they miss, which has a unit.
+            if [scaled.rung, solution.rung] == [Rung::Cholesky; 2] {
+                let unit = scale.powi(degree as i32);
+                assert!(v.iter().zip(&w).all(|(v, w)| v * unit == *w), "{D} {degree} {order} {exponent}");
+            }
+        }
+        system.fill(&z, Window::Wendland, 1.1 * RADIUS);
+        let mut expected = vec![0.0; w.len()];
+        let exact = Lu.solve(&system, &mut MomentScratch::default(), &mut expected).expect("regular").condition;
+        // Of A and of the sums of the iterations.
+        let rounding = 16.0 * f64::EPSILON * exact * exact * system.conditions() as f64;
+        let ratio = solution.condition / exact;
+        assert!(ratio > 0.3 && ratio < 1.0 + rounding, "{D} {degree} {order}: {ratio}");
+    }
+    for seed in 0..20 {
+        for half in 0..2 {
+            check::<1>(2, 3, 1, half, seed);
+            check::<2>(2, 2, 1, half, seed);
+            check::<2>(1, 2, 0, half, seed);
+            check::<2>(1, 3, 0, half, seed);
+            check::<2>(2, 4, 1, half, seed);
+            check::<3>(0, 1, 0, half, seed);
+            check::<3>(1, 2, 1, half, seed);
+        }
+    }
 }
 
 proptest! {

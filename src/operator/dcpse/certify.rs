@@ -4,6 +4,7 @@ use super::Settings;
 use super::group::{Column, Conditions, Group, Pairing};
 use crate::error::{Error, ErrorKind, OperatorError, Result};
 use crate::moment::{BatchScratch, MomentScratch, MomentSolver, Rung, Solution, Windows};
+use crate::operator::finite;
 use crate::operator::method::spread;
 use crate::scalar::square;
 use crate::stencil::Stencil;
@@ -113,7 +114,7 @@ pub(super) fn certify<S: MomentSolver, const D: usize, const K: usize, const L: 
             certificate.rung = certificate.rung.max(Some(rung));
             for (&column, solved) in outputs.iter().zip(w.chunks_exact(z.len())) {
                 certificate.negative += solved.iter().take(neighbors).filter(|&&w| w < 0.0).count();
-                hand_out(column, solved, inverse, pairing, &mut jobs[i])?;
+                hand_out(column, solved, inverse, pairing, &mut jobs[i]);
             }
             Ok(())
         };
@@ -123,6 +124,14 @@ pub(super) fn certify<S: MomentSolver, const D: usize, const K: usize, const L: 
             {
                 *found = Err(error);
             }
+        }
+    }
+    // epsilon^-m can overflow, and so can a diagonal of weights that do not.
+    for (found, job) in found.iter_mut().zip(jobs) {
+        if found.is_ok()
+            && let Err(error) = finite(job.row, job.w.iter().map(<[f64; K]>::as_slice), job.diagonal)
+        {
+            *found = Err(error);
         }
     }
     found
@@ -162,15 +171,13 @@ fn hand_out<const D: usize, const K: usize>(
     inverse: f64,
     pairing: Pairing,
     job: &mut Job<'_, D, K>,
-) -> Result<()> {
-    // epsilon^-m comes last: it alone can overflow.
+) {
     let scale = (0..degree).fold(scale, |product, _| product * inverse);
-    let (signs, mut diagonal, mut finite) = (job.row.signs(), 0.0, true);
+    let (signs, mut diagonal) = (job.row.signs(), 0.0);
     if pairing == Pairing::Difference && signs.iter().all(|&sign| sign == 1) {
         // Nothing is left for the diagonal, and no sum makes one weight wait for another.
         for (w, &solved) in job.w.iter_mut().zip(column) {
             w[k] = solved * scale;
-            finite &= w[k].is_finite();
         }
     } else {
         let sigma = pairing.sigma();
@@ -179,15 +186,10 @@ fn hand_out<const D: usize, const K: usize>(
             let (on_difference, share) = spread(weight, sigma * weight, sign);
             w[k] = on_difference;
             diagonal += share;
-            finite &= on_difference.is_finite();
         }
-    }
-    if !finite && let Some((w, &q)) = job.w.iter().zip(job.row.sources()).find(|(w, _)| !w[k].is_finite()) {
-        return Err(OperatorError::Weight { q: q as usize, weight: w[k] }.into());
     }
     if let (Pairing::Sum, Some(own)) = (pairing, column.get(job.row.len())) {
         diagonal += 2.0 * own * scale;
     }
     job.diagonal[k] = if job.row.center().is_some() { diagonal } else { 0.0 };
-    Ok(())
 }
