@@ -125,7 +125,7 @@ fn write(choice: &Choice, bench: &Bench) -> Result<(), Box<dyn Error>> {
         page.figure(scene, &fs::read_to_string(path)?)?;
     }
     for (scene, text) in &bench.notes {
-        page.note(scene, text);
+        page.note(scene, text)?;
     }
     for (scene, holds, text) in &bench.claims {
         page.note(scene, &format!("{}: {text}", if *holds { "holds" } else { "FAILS" }))?;
