@@ -1,9 +1,11 @@
-//! A method of your own on the same curves: a Laplacian of first differences along each pair, after Brookshaw, beside PSE
+//! A method of your own on the same curves, of error, time and memory: a Laplacian of first differences along each pair, after Brookshaw, beside PSE
 //! and DC-PSE on jittered sets. Writes `own_method.csv`, `own_method.svg` and `own_method.html`,
 //! and exits with 1 when the three do not come out as theory says.
 //!
 //! `cargo run --release --example own_method [-- --quick] [-- --out DIR]`
 
+#[path = "../work_precision/counting.rs"]
+mod counting;
 #[path = "../work_precision/curves.rs"]
 mod curves;
 #[allow(dead_code, reason = "panels are drawn by the grid")]
@@ -13,6 +15,8 @@ mod figure;
 mod grid;
 #[path = "../options/mod.rs"]
 mod options;
+#[path = "../work_precision/tags.rs"]
+mod tags;
 
 use std::error::Error;
 use std::f64::consts::{PI, TAU};
@@ -86,7 +90,7 @@ fn own_method(options: &Options) -> std::result::Result<bool, Box<dyn Error>> {
         for (name, order) in [("Brookshaw", 2), ("PSE", 2), ("DC-PSE", 2), ("DC-PSE", 4)] {
             let what = Sample { n: f.len(), h, ..Sample::new("own_method", 2, "jittered", name, order) };
             let cells = |cutoff: Cutoff| CellList::build(&particles, &torus, cutoff);
-            table.push(measure(what, Repeats::default(), None, |watch, sample| match name {
+            table.push(measure(what, Repeats::default(), Some(counting::peak), |watch, sample| match name {
                 "Brookshaw" => work(watch, sample, &f, &Brookshaw { radius: 4.0 * h }, || cells(Cutoff(4.0 * h))),
                 "PSE" => {
                     let pse = Pse::new(Laplacian::<2>, 2, particles.spacing()?.epsilon(2.0)?, particles.volumes()?)?;

@@ -195,7 +195,7 @@ fn timed<M: Method<2, Out = [f64; 1]> + Clone, St: TimeScheme<2, Physics<M>>>(
     steps: u64,
     applies: impl Fn(&St) -> u64,
 ) -> Result<(Field, u64, f64)> {
-    let mut run = setting.run(stepper)?;
+    let mut run = setting.run(&setting.search()?, stepper)?;
     let (mut u, mut sum) = (setting.start.clone(), 0);
     let clock = Instant::now();
     for _ in 0..steps {

@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use parops::{
-    AdvectionDiffusion, CellList, DcPse, Diffusion, Domain, Euler, Eulerian, Exchange, Exponential, GrowthPolicy,
-    Laplacian, Mean, Method, Particles, Pse, Result, Rk4, RowSymmetry, SemiDiscrete, SspRk3, StepPolicy, Stepper,
-    TimeScheme,
+    AdvectionDiffusion, CellList, Cutoff, DcPse, Diffusion, Domain, Euler, Eulerian, Exchange, Exponential,
+    GrowthPolicy, Laplacian, Mean, Method, Particles, Pse, Result, Rk4, RowSymmetry, SemiDiscrete, SspRk3, StepPolicy,
+    Stepper, TimeScheme,
 };
 
 use crate::scheme::Scheme;
@@ -39,7 +39,7 @@ fn physics<M: Method<2, Out = [f64; 1]>>(method: M) -> Physics<M> {
 pub struct Setting<M> {
     pub name: &'static str,
     pub particles: Particles<2>,
-    neighbors: CellList<2>,
+    cutoff: Cutoff,
     method: M,
     pub start: Vec<f64>,
     pub symmetry: RowSymmetry,
@@ -53,20 +53,21 @@ pub struct Setting<M> {
 pub fn lattice(side: usize) -> Result<Setting<Pse<Exchange<2>>>> {
     let particles = Particles::lattice([0.0; 2], [1.0; 2], [side; 2])?;
     let pse = Pse::new(Laplacian::<2>, 2, particles.spacing()?.epsilon(1.5)?, particles.volumes()?)?.support(4.5)?;
-    let neighbors = CellList::build(&particles, &torus()?, pse.cutoff())?;
-    Setting::new("lattice", particles, neighbors, pse)
+    let cutoff = pse.cutoff();
+    Setting::new("lattice", particles, cutoff, pse)
 }
 
 /// DC-PSE of order 2 on a jittered set: rows that are not.
 pub fn scattered(side: usize) -> Result<Setting<DcPse<Laplacian<2>, 2>>> {
     let particles = Particles::jittered([0.0; 2], [1.0; 2], [side; 2], 0.2, 1)?;
     let dcpse = DcPse::new();
-    let neighbors = CellList::build(&particles, &torus()?, dcpse.cutoff(&particles)?)?;
-    Setting::new("scattered", particles, neighbors, dcpse)
+    let cutoff = dcpse.cutoff(&particles)?;
+    Setting::new("scattered", particles, cutoff, dcpse)
 }
 
 impl<M: Method<2, Out = [f64; 1]> + Clone> Setting<M> {
-    fn new(name: &'static str, particles: Particles<2>, neighbors: CellList<2>, method: M) -> Result<Self> {
+    fn new(name: &'static str, particles: Particles<2>, cutoff: Cutoff, method: M) -> Result<Self> {
+        let neighbors = CellList::build(&particles, &torus()?, cutoff)?;
         // No mode grows: once looked for.
         Eulerian::new(physics(method.clone()), &particles, &neighbors, Euler::new())?;
         let mut discrete = SemiDiscrete::new(physics(method.clone()), &particles, &neighbors, GrowthPolicy::Refuse)?;
@@ -76,7 +77,7 @@ impl<M: Method<2, Out = [f64; 1]> + Clone> Setting<M> {
         let rate = 2.0 / discrete.limits(0.0, &start)?.step(&Euler::<Vec<f64>>::new());
         let mut end = start.clone();
         exact.propagate(END, &mut end)?;
-        Ok(Self { name, symmetry: discrete.symmetry(), particles, neighbors, method, start, rate, end })
+        Ok(Self { name, symmetry: discrete.symmetry(), particles, cutoff, method, start, rate, end })
     }
 
     /// The longest step of explicit Euler, which is that of diffusion number 1.
@@ -103,10 +104,17 @@ impl<M: Method<2, Out = [f64; 1]> + Clone> Setting<M> {
         f64::sqrt(miss / size)
     }
 
-    /// A run by this scheme; growth was looked for once.
-    pub fn run<St: TimeScheme<2, Physics<M>>>(&self, stepper: St) -> Result<Eulerian<2, Physics<M>, St>> {
-        let Self { particles, neighbors, method, .. } = self;
+    /// The neighbors of all particles.
+    pub fn search(&self) -> Result<CellList<2>> {
+        CellList::build(&self.particles, &torus()?, self.cutoff)
+    }
+
+    /// A run by this scheme with what `search` found; growth was looked for once.
+    pub fn run<St>(&self, neighbors: &CellList<2>, stepper: St) -> Result<Eulerian<2, Physics<M>, St>>
+    where
+        St: TimeScheme<2, Physics<M>>,
+    {
         let (steps, growth) = (StepPolicy::Refuse, GrowthPolicy::Unknown);
-        Eulerian::with_policy(physics(method.clone()), particles, neighbors, stepper, steps, growth)
+        Eulerian::with_policy(physics(self.method.clone()), &self.particles, neighbors, stepper, steps, growth)
     }
 }

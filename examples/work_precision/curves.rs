@@ -1,12 +1,14 @@
 //! The figure of a scene: error over time, a panel a dimension and set, the Pareto front marked.
 
 use std::error::Error;
+use std::fs;
 use std::path::Path;
 
 use parops::report::{Sample, Table, Task};
 
 use crate::figure::{Axes, Curve, Mark};
 use crate::grid;
+use crate::tags::{self, Series};
 
 const MARKS: [Mark; 4] = [Mark::Circles, Mark::Triangles, Mark::Crosses, Mark::Squares];
 /// The black of the palette, kept for the front.
@@ -45,7 +47,11 @@ pub fn draw(path: &Path, table: &Table, scene: &str) -> Result<(), Box<dyn Error
         }
     };
     let groups = if crowded { steppers.iter().map(Some).collect() } else { vec![None] };
-    let mut panels = Vec::new();
+    let numbered = |samples: &[&Sample]| -> Vec<usize> {
+        let drawn = samples.iter().filter(|sample| point(sample).is_some());
+        drawn.filter_map(|sample| of_scene().position(|other| std::ptr::eq(other, *sample))).collect()
+    };
+    let (mut panels, mut drawn) = (Vec::new(), Vec::new());
     for task in &tasks {
         for &stepper in &groups {
             let first = task.samples()[0];
@@ -53,8 +59,12 @@ pub fn draw(path: &Path, table: &Table, scene: &str) -> Result<(), Box<dyn Error
             let title = stepper.map_or(title.clone(), |stepper| format!("{title}, {stepper}"));
             // What has no stepper is to be compared with each.
             let here = |s: &Sample| stepper.is_none_or(|stepper| s.stepper == *stepper || s.stepper.is_empty());
-            let mut curves: Vec<Curve> = task.series().iter().filter(|series| here(series[0])).map(curve).collect();
-            let front = task.front().into_iter().filter_map(point).collect();
+            let (all, front) = (task.series(), task.front());
+            let shown = || all.iter().filter(|series| here(series[0]));
+            drawn.extend(shown().map(|series| Series::Curve(numbered(series))));
+            drawn.push(Series::Front(numbered(&front)));
+            let mut curves: Vec<Curve> = shown().map(curve).collect();
+            let front = front.into_iter().filter_map(point).collect();
             curves.push(Curve { name: "Pareto front".to_string(), points: front, mark: Mark::Dashed, color: BLACK });
             panels.push((title, curves));
         }
@@ -68,7 +78,8 @@ pub fn draw(path: &Path, table: &Table, scene: &str) -> Result<(), Box<dyn Error
         (false, 1) => titles.len(),
         (false, sets) => sets,
     };
-    grid::draw(path, columns.min(titles.len()), panels)
+    grid::draw(path, columns.min(titles.len()), panels)?;
+    Ok(fs::write(path, tags::tag(&fs::read_to_string(path)?, &drawn)?)?)
 }
 
 /// Time and error; an error of zero has no place on a logarithmic axis.

@@ -42,6 +42,8 @@ mod sets;
 #[path = "../stiff_diffusion/setting.rs"]
 mod setting;
 mod stiff;
+mod tags;
+mod timed;
 
 use std::error::Error;
 use std::fs::{self, File};
@@ -112,6 +114,7 @@ fn write(choice: &Choice, bench: &Bench) -> Result<(), Box<dyn Error>> {
     }
     page.fact("compiler", &compiler());
     page.fact("threads used", "1");
+    page.fact("times", &bench.timing());
     page.fact("run", if choice.quick { "quick: fewer particles, fewer repeats" } else { "full" });
     for scene in bench.table.scenes() {
         let path = choice.out.join(format!("work_precision_{scene}.svg"));
@@ -120,6 +123,9 @@ fn write(choice: &Choice, bench: &Bench) -> Result<(), Box<dyn Error>> {
     }
     for (scene, path) in &bench.figures {
         page.figure(scene, &fs::read_to_string(path)?)?;
+    }
+    for (scene, text) in &bench.notes {
+        page.note(scene, text)?;
     }
     for (scene, holds, text) in &bench.claims {
         page.note(scene, &format!("{}: {text}", if *holds { "holds" } else { "FAILS" }))?;

@@ -18,6 +18,7 @@ use parops::{
 use crate::bench::Bench;
 use crate::figure::{Axes, Curve, Mark};
 use crate::grid;
+use crate::tags::{self, Series};
 
 const SCENE: &str = "overlap";
 /// The wave sin(2 pi x + phase).
@@ -35,6 +36,8 @@ const TITLES: [[&str; 2]; 2] = [
     ["jittered, h/epsilon kept", "jittered, h/epsilon falling"],
 ];
 
+const PHASES: &str = "Build makes kernels and checks every row, apply makes the rows again and applies them.";
+
 /// The two parts of a relative error in L2.
 struct Parts {
     mollification: f64,
@@ -44,7 +47,11 @@ struct Parts {
 pub fn run(bench: &mut Bench) -> Result<(), Box<dyn Error>> {
     let sides: &[usize] =
         if bench.quick { &[32, 128, 512, 2048] } else { &[32, 64, 128, 256, 512, 1024, 2048, 4096, 8192] };
+    bench.note(SCENE, PHASES);
     let mut panels: Vec<(Axes, Vec<Curve>)> = Vec::new();
+    // The samples of the curves of each panel.
+    let mut drawn: Vec<Vec<Series>> = Vec::new();
+    let mut samples = 0;
     let mut csv = "set,order,overlap,n,h,epsilon,error_l2,mollification_l2,quadrature_l2\n".to_string();
     for (set, jitter) in [("lattice", 0.0), ("jittered", JITTER)] {
         for order in [2, 4] {
@@ -95,19 +102,25 @@ pub fn run(bench: &mut Bench) -> Result<(), Box<dyn Error>> {
                 }
                 claim(bench, set, order, falling, &errors, &parts);
                 let title = TITLES[usize::from(jitter > 0.0)][usize::from(falling)];
-                match panels.iter_mut().find(|(axes, _)| axes.title == title) {
-                    Some((_, all)) => all.extend(curves(order, sides, &parts)),
-                    None => {
-                        let axes = Axes { title, x: "spacing h", y: "part of the L2 error", logarithmic: true };
-                        panels.push((axes, curves(order, sides, &parts).into()));
-                    }
+                let here = panels.iter().position(|(axes, _)| axes.title == title).unwrap_or(panels.len());
+                if here == panels.len() {
+                    let axes = Axes { title, x: "spacing h", y: "part of the L2 error", logarithmic: true };
+                    panels.push((axes, Vec::new()));
+                    drawn.push(Vec::new());
                 }
+                for curve in curves(order, sides, &parts) {
+                    panels[here].1.push(curve);
+                    drawn[here].push(Series::Curve((samples..samples + sides.len()).collect()));
+                }
+                samples += sides.len();
             }
         }
     }
     std::fs::write(bench.out.join("overlap_parts.csv"), csv)?;
     let file = bench.out.join("overlap_parts.svg");
     grid::draw(&file, panels.len(), panels)?;
+    let drawn: Vec<Series> = drawn.into_iter().flatten().collect();
+    std::fs::write(&file, tags::tag(&std::fs::read_to_string(&file)?, &drawn)?)?;
     bench.figures.push((SCENE.to_string(), file));
     Ok(())
 }

@@ -39,7 +39,8 @@ const TOTAL_TOLERANCE: f64 = 1e-5;
 
 impl Table {
     /// Writes the header and a line a sample. Cells with a comma, a quote or a line break are quoted, quotes in them
-    /// doubled; numbers read back to the same bits; what a sample does not have is empty.
+    /// doubled; numbers read back to the same bits; what a sample does not have is empty, and so is a phase that was not
+    /// timed.
     ///
     /// # Errors
     /// [`IoError::Write`](crate::IoError::Write) with the number of bytes taken before the writer failed.
@@ -76,6 +77,7 @@ impl Table {
 fn line(sample: &Sample, out: &mut impl Write) -> io::Result<()> {
     let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:e}"));
     let Seconds { neighbors, build, apply, step } = sample.seconds;
+    let timed = |seconds: f64| number((seconds != 0.0).then_some(seconds));
     let cells = [
         quoted(&sample.scene),
         sample.dim.to_string(),
@@ -93,10 +95,10 @@ fn line(sample: &Sample, out: &mut impl Write) -> io::Result<()> {
         number(Some(sample.error_l2)),
         number(Some(sample.error_linf)),
         number(sample.observed_order),
-        number(Some(neighbors)),
-        number(Some(build)),
-        number(Some(apply)),
-        number(Some(step)),
+        timed(neighbors),
+        timed(build),
+        timed(apply),
+        timed(step),
         number(Some(sample.seconds.total())),
         sample.peak_bytes.map_or(String::new(), |bytes| bytes.to_string()),
     ];
@@ -117,7 +119,8 @@ fn sample(line: usize, cells: &[String]) -> Result<Sample> {
     }
     let real = |i: usize| read::<f64>(cells, line, i);
     let optional = |i: usize| if cells[i].is_empty() { Ok(None) } else { real(i).map(Some) };
-    let seconds = Seconds { neighbors: real(16)?, build: real(17)?, apply: real(18)?, step: real(19)? };
+    let phase = |i: usize| optional(i).map(|seconds| seconds.unwrap_or(0.0));
+    let seconds = Seconds { neighbors: phase(16)?, build: phase(17)?, apply: phase(18)?, step: phase(19)? };
     let (found, sum) = (real(20)?, seconds.total());
     if !((found - sum).abs() <= TOTAL_TOLERANCE * sum) {
         return Err(ReportError::Total { line, found, sum }.into());

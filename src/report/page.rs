@@ -115,8 +115,8 @@ impl<'a> Page<'a> {
     }
 }
 
-const ABOUT: &str = "Errors are L2 errors as each scene defines them. Times are medians of repeated runs; the total is \
-    the sum of neighbors, build, apply and step. The cheapest method for an error is the fastest sample that reached \
+const ABOUT: &str = "Errors are L2 errors as each scene defines them. A time is the median of the runs of its sample; the \
+    total is the sum of neighbors, build, apply and step, of which an empty one was not timed apart. The cheapest method for an error is the fastest sample that reached \
     it: nothing is interpolated. Rows in bold are on the Pareto front of their dimension and set: no other sample \
     is both faster and more accurate.";
 
@@ -194,7 +194,7 @@ fn samples(tasks: &[&Task], out: &mut impl Write) -> io::Result<()> {
 /// Seconds with a unit that leaves one to three digits in front.
 fn duration(seconds: f64) -> String {
     match seconds {
-        0.0 => "0".to_string(),
+        0.0 => String::new(),
         s if s < 1e-3 => format!("{:.2} µs", 1e6 * s),
         s if s < 1.0 => format!("{:.2} ms", 1e3 * s),
         s => format!("{s:.2} s"),

@@ -16,7 +16,7 @@ pub enum Phase {
     Step,
 }
 
-/// Seconds of each phase.
+/// Seconds of each phase; 0 of one that was not timed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Seconds {
     /// In [`Phase::Neighbors`].
@@ -35,12 +35,18 @@ impl Seconds {
         self.neighbors + self.build + self.apply + self.step
     }
 
-    /// The median of each phase; zero without runs, the later of the two middle ones of an even number.
+    /// The median of each phase: the middle one of the runs, the mean of the two middle ones of an even number; zero
+    /// without runs.
     pub fn medians(runs: &[Self]) -> Self {
         let median = |of: fn(&Self) -> f64| {
             let mut values: Vec<f64> = runs.iter().map(of).collect();
             values.sort_by(f64::total_cmp);
-            values.get(values.len() / 2).copied().unwrap_or(0.0)
+            let middle = values.len() / 2;
+            match values[..] {
+                [] => 0.0,
+                _ if values.len().is_multiple_of(2) => 0.5 * (values[middle - 1] + values[middle]),
+                _ => values[middle],
+            }
         };
         Self {
             neighbors: median(|run| run.neighbors),
