@@ -157,13 +157,20 @@ impl<T: Scalar, const D: usize> MomentSystem<T, D> {
     }
 
     /// V^T w of condition j and the sum of absolute terms, for y = E^-1 w.
+    ///
+    /// What an addition loses is carried along: the bounds on a residual know l and not n, and the rounding of a plain
+    /// sum of a thousand terms alone would break them.
     fn moment(&self, j: usize, y: &[T]) -> (T, T) {
-        let pairs = self.column(j).iter().zip(y);
-        let (sum, terms) = pairs.fold((T::zero(), T::zero()), |(sum, terms), (&b, &y)| {
+        let (mut sum, mut lost, mut terms) = (T::zero(), T::zero(), T::zero());
+        for (&b, &y) in self.column(j).iter().zip(y) {
             let product = b * y;
-            (sum + product, terms + product.abs())
-        });
-        (sum / self.scales[j], terms / self.scales[j])
+            let next = sum + product;
+            let added = next - sum;
+            lost += (sum - (next - added)) + (product - added);
+            sum = next;
+            terms += product.abs();
+        }
+        ((sum + lost) / self.scales[j], terms / self.scales[j])
     }
 
     /// b - V^T w in the scaling of B, for y = E^-1 w: what a corrected step starts from.
