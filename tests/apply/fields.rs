@@ -1,6 +1,7 @@
 //! Several fields at once: the bits of each alone, any strides, refusals that name particle and field.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use parops::{
     Apply, ApplyError, BruteForce, CellList, Cutoff, D2, DcPse, Domain, Error, ErrorKind, Face, Field, Laplacian,
     Particles, Pse, Random, Rows, Strided, testing::Promise,
@@ -89,7 +90,7 @@ fn strided_fields_have_the_bits_of_each_alone_for_any_layout() {
     let (rows, n) = (rows::<f64>(), 26 * 26);
     // Fields, gaps between fields and between particles, and which of the two is the outer one; of input and output.
     let layout = || (0..4_usize, 0..3_usize, any::<bool>());
-    let config = ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() };
+    let config = properties(cases);
     proptest!(config, |(count in 0..36_usize, input in layout(), output in layout(), seed in any::<u64>())| {
         let strides = |(outer, inner, stacked): (usize, usize, bool)| {
             let inner = inner + 1;

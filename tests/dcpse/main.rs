@@ -6,6 +6,8 @@ mod bands;
 mod cases;
 #[path = "../../examples/orders/measure.rs"]
 mod measure;
+#[path = "../properties/mod.rs"]
+mod properties;
 #[path = "../../examples/orders/sets.rs"]
 mod sets;
 

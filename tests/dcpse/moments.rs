@@ -1,6 +1,7 @@
 //! Moments by quadrature, in closed form and over particles.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use parops::{
     CenterTerm, Error, ErrorKind, Exchange, Gaussian, Kernel, KernelError, MultiIndex, Neighbor, OperatorError,
     ParticleError, Stencil, Term, Volumes, continuous_moment, discrete_moment, discrete_moments, graded,
@@ -35,7 +36,7 @@ fn lattice<const D: usize>(h: f64, cutoff: f64) -> Stencil<D> {
 const SUM: f64 = 1e4 * f64::EPSILON;
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases().div_ceil(5), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(properties(cases().div_ceil(5)))]
 
     #[test]
     fn quadrature_agrees_with_exact_moments(

@@ -4,15 +4,12 @@
 //! estimate of all rows, in units of the row's own sum of absolute weights.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use parops::{
     Apply, BruteForce, CellList, Cutoff, DcPse, Domain, Expression, Gradient, Laplacian, MultiIndex, Nearest,
     Neighbors, Particles, Random, Row, Rows, Sign, testing::Promise,
 };
 use proptest::prelude::*;
-
-fn config() -> ProptestConfig {
-    ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() }
-}
 
 /// Particles along an axis.
 const SIDE: usize = 7;
@@ -141,7 +138,7 @@ fn relation(text: &'static str) -> Promise {
 }
 
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn m1_exact_translation_leaves_every_bit(seed: u64, choice in choice(), t in [-1048576..1048576_i32, -1048576..1048576]) {

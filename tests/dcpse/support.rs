@@ -1,8 +1,9 @@
 //! Rows that are refused at first: wider supports, what stands in for them, and what the report and the error say.
 
 use parops::{
-    Apply, CellList, Cutoff, DcPse, Domain, Epsilon, ErrorKind, Expression, Fallback, GROWTH, Gradient, Histogram,
-    Laplacian, MultiIndex, Nearest, Neighbors, OperatorError, Particles, Random, Rows, Several, Sign,
+    Apply, BruteForce, CellList, Cutoff, DcPse, Domain, Epsilon, ErrorKind, Expression, Fallback, GROWTH, Gradient,
+    Histogram, Laplacian, MultiIndex, Nearest, Neighbors, OperatorError, Particles, Random, Rows, Several, Sign,
+    testing::Promise,
 };
 
 type Failure = Result<(), parops::Error>;
@@ -302,4 +303,24 @@ fn histograms_count_powers_of_ten_from_below_and_what_is_not_positive_as_small()
     for large in [1e32, f64::INFINITY, f64::NAN] {
         assert_eq!(edge(large), 1e31, "{large:e}");
     }
+}
+
+#[test]
+fn thousands_of_neighbors_are_no_reason_to_refuse_a_row() -> Failure {
+    for side in [32, 60] {
+        let particles = Particles::<2>::jittered([0.0; 2], [1.0; 2], [side; 2], 0.3, 3)?;
+        let all = BruteForce::build(&particles, &Domain::open(), Cutoff(1.5))?;
+        for (beta, order) in [([0, 0], 1), ([1, 0], 1), ([0, 1], 2)] {
+            for sign in [Sign::Plus, Sign::Minus] {
+                let dcpse = DcPse::at_order(Expression::new([(MultiIndex::new(beta), 1.0)])?, order)?.sign(sign);
+                let rows: Rows = dcpse.assemble(&all)?;
+                let report = rows.report();
+                let unit = f64::EPSILON * report.worst().unwrap().conditions as f64 * report.condition;
+                Promise::new("Residuals", "largest residual of rows of 1023 and 3599 neighbors")
+                    .in_units("l eps cond beta!", unit)
+                    .at_most(4.0, report.residual);
+            }
+        }
+    }
+    Ok(())
 }

@@ -1,6 +1,7 @@
 //! The lattice hat kernel: PSE with it is the second-order finite difference, and nothing else is accepted.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use parops::{
     Apply, CellList, CenterTerm, Cutoff, Domain, Epsilon, Error, ErrorKind, Form, Kernel, LatticeHat, MultiIndex,
     Neighbor, OperatorError, Particles, Pse, Random, Rows, Spacing, Stencil, Volumes, discrete_moments, graded,
@@ -8,11 +9,6 @@ use parops::{
 use proptest::prelude::*;
 
 type Failure = Result<(), Error>;
-
-fn config(share: u32) -> ProptestConfig {
-    let cases: u32 = cases();
-    ProptestConfig { cases: (cases / share).max(1), failure_persistence: None, ..ProptestConfig::default() }
-}
 
 fn pse<const D: usize>(particles: &Particles<D>, epsilon: Epsilon) -> Result<Pse<LatticeHat<D>>, Error> {
     Pse::with_kernels([LatticeHat::new()], epsilon, particles.volumes()?)
@@ -60,7 +56,7 @@ fn equal_to_rounding<const D: usize>(n: usize, seed: u64) -> Failure {
 }
 
 proptest! {
-    #![proptest_config(config(10))]
+    #![proptest_config(properties(cases() / 10))]
 
     #[test]
     fn pse_with_the_hat_is_the_finite_difference_to_rounding_on_any_lattice(n in 3..40_usize, seed in any::<u64>()) {

@@ -3,16 +3,13 @@
 use std::collections::HashSet;
 
 use crate::cases::cases;
+use crate::properties::properties;
 use parops::{
     Beta, D1, D2, D3, Error, ErrorKind, Exponents, HasLen, MultiIndex, MultiIndexError, Term, common_degree,
     condition_count, graded,
 };
 use proptest::prelude::*;
 use typenum::{U0, U1, U2, U3, U4, U5, U7, U255, Unsigned, tarr};
-
-fn config() -> ProptestConfig {
-    ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() }
-}
 
 fn kind(error: Error) -> ErrorKind {
     assert_eq!(error.particle(), None);
@@ -228,7 +225,7 @@ fn power_bound(degree: u32, eps: f64) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn degree_parity_and_sign_follow_the_exponents(exponents in any::<[u8; 5]>()) {

@@ -1,15 +1,12 @@
 //! Exact rational numbers: arithmetic, order, rounding to doubles.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use parops::Rational;
 use proptest::prelude::*;
 
-fn config() -> ProptestConfig {
-    ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() }
-}
-
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn rational_arithmetic_agrees_with_integers(a in -1000_i128..1000, b in 1_i128..1000, c in -1000_i128..1000, d in 1_i128..1000) {

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::cases::cases;
+use crate::properties::properties;
 use num_dual::Dual64;
 use parops::{
     CellList, Domain, Epsilon, Error, ErrorKind, Kernel, LatticeSpectrum, OperatorError, Particles, Pse,
@@ -12,11 +13,6 @@ use proptest::prelude::*;
 use serde_json::Value;
 
 type Failure = Result<(), Error>;
-
-fn config() -> ProptestConfig {
-    let cases = cases();
-    ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
-}
 
 fn value(z: [f64; 3]) -> f64 {
     RationalLaplacian::new().value(&z)
@@ -201,7 +197,7 @@ fn waves_are_damped_with_an_error_of_second_order() {
 }
 
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn value_is_the_formula_in_all_scalars(z in prop::array::uniform3(-5.0..5.0_f64)) {

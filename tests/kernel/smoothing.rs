@@ -3,17 +3,13 @@
 use std::f64::consts::PI;
 
 use crate::cases::cases;
+use crate::properties::properties;
 use num_dual::Dual64;
 use parops::{
     CubicSpline, Differentiated, ErrorKind, Kernel, KernelError, MultiIndex, QuinticSpline, Rational, SmoothingKernel,
     Term, WendlandC2, WendlandC4, WendlandC6, continuous_moments, graded, moment_conditions, required_moment,
 };
 use proptest::prelude::*;
-
-fn config() -> ProptestConfig {
-    let cases = cases();
-    ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
-}
 
 /// What every kernel of this file is to the generic tests.
 trait Compact<const D: usize>:
@@ -367,7 +363,7 @@ fn derivatives_agree_with_dual_numbers_at_origin_axes_knots_and_edge() {
 }
 
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn derivatives_agree_with_dual_numbers_anywhere_in_two_dimensions(z in prop::array::uniform2(-3.0..3.0_f64)) {

@@ -3,16 +3,13 @@
 use std::time::{Duration, Instant};
 
 use crate::cases::cases;
+use crate::properties::properties;
 use num_dual::Dual64;
 use parops::{
     Error, ErrorKind, ExactPolynomial, Exchange, Gaussian, HighOrderGaussian, Kernel, KernelError, MultiIndex,
     MultiIndexError, Rational, SmoothingKernel, Term, WideGaussian, graded, moment_conditions,
 };
 use proptest::prelude::*;
-
-fn config() -> ProptestConfig {
-    ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() }
-}
 
 fn one<const D: usize>(exponents: [u8; D]) -> Vec<Term<D>> {
     vec![Term { index: MultiIndex::new(exponents), factor: 1.0 }]
@@ -70,7 +67,7 @@ fn sums<const D: usize>() -> impl Strategy<Value = Vec<Term<D>>> {
 }
 
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn exchange_satisfies_every_condition_exactly_for_random_sums_in_one_dimension(terms in sums::<1>(), order in order()) {

@@ -1,6 +1,7 @@
 //! Boundary conditions as rows: exactness, the coupled system, evolutions between walls, steady problems, refusals.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use nalgebra::{DMatrix, DVector};
 use parops::{
     Apply, ApplyError, BoundaryCondition, BoundaryError, BoundaryRows, CellList, Contraction, CsrMatrix, Cutoff, DcPse,
@@ -144,7 +145,7 @@ fn miss<const D: usize>(n: usize, order: u32, seed: u64) -> (f64, f64) {
 }
 
 fn returns_polynomials<const D: usize>(n: usize, orders: std::ops::RangeInclusive<u32>, share: u32) {
-    let config = ProptestConfig { cases: cases() / share, failure_persistence: None, ..ProptestConfig::default() };
+    let config = properties(cases() / share);
     TestRunner::new(config)
         .run(&(orders, any::<u64>()), |(order, seed)| {
             let (miss, condition) = miss::<D>(n, order, seed);

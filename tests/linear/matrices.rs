@@ -1,6 +1,7 @@
 //! Sparse matrices, their incomplete factors, GMRES and BiCGSTAB, against dense algebra.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use nalgebra::{DMatrix, DVector};
 use parops::{
     Apply, ApplyError, BiCgStab, CellList, CsrMatrix, DcPse, Domain, Error, ErrorKind, Gmres, Ilu0, Laplacian,
@@ -72,7 +73,7 @@ fn noise(n: usize, seed: u64) -> Vec<f64> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn matrix_of_triplets_multiplies_like_the_dense_one(
@@ -460,7 +461,7 @@ fn steady(m: usize) -> Result<CsrMatrix> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn solver_inverts_random_matrices_and_knows_their_condition(seed in any::<u64>(), n in 1_usize..40) {

@@ -2,6 +2,7 @@
 
 use crate::cases::cases;
 use crate::dense;
+use crate::properties::properties;
 use parops::{
     Allowance, Along, Apply, CellList, CsrMatrix, DcPse, Domain, ErrorKind, Laplacian, LinearError, Nearest, Particles,
     Pse, Result, Rows, Sign, Spectrum, SpectrumEstimator,
@@ -160,7 +161,7 @@ fn estimates_are_repeated_bit_for_bit_and_scale_with_the_operator() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases().div_ceil(4), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(properties(cases().div_ceil(4)))]
 
     #[test]
     fn known_spectra_are_found(

@@ -2,6 +2,8 @@
 
 #[path = "../cases/mod.rs"]
 mod cases;
+#[path = "../properties/mod.rs"]
+mod properties;
 
 mod remesh;
 mod transfer;

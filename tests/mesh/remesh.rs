@@ -1,15 +1,12 @@
 //! Remeshing: what becomes a particle, what is counted as dropped, and what 400 remeshings leave of a step.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use parops::{
     Cic, Domain, Error, ErrorKind, Face, Lambda, Mesh, MeshError, MeshKernel, Particles, Random, Result, Volumes,
     testing::Promise,
 };
 use proptest::prelude::*;
-
-fn config() -> ProptestConfig {
-    ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() }
-}
 
 /// What 400 remeshings make of a step: the relative mass error, and by how much it is overshot after one and after all.
 struct Record {
@@ -84,7 +81,7 @@ fn exact_sum(terms: &[f64]) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn kept_and_dropped_add_up_to_the_mesh(seed in any::<u64>(), threshold in 0.0..2.0_f64) {

@@ -1,15 +1,12 @@
 //! Transfer between particles and meshes: moments, reproduction, adjointness, periodic seams, bounds, threads.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use parops::{
     ApplyError, Centering, Cic, Domain, Error, Face, Lambda, Mesh, MeshError, MeshKernel, Ngp, ParticleError, Random,
     Result, Tsc, Volumes, testing::Promise,
 };
 use proptest::prelude::*;
-
-fn config() -> ProptestConfig {
-    ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() }
-}
 
 /// Calls `$check::<D, _, S>(&kernel, "name", arguments)` for every kernel.
 macro_rules! each_kernel {
@@ -237,7 +234,7 @@ fn depositing_is_the_sum_over_all_nodes_and_images() {
 }
 
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn depositing_and_gathering_are_adjoint_and_conserve_the_total(

@@ -1,6 +1,7 @@
 //! Domains: legal boxes, wrapping by the last bit, what is refused.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use parops::{
     BruteForce, CellList, Cutoff, Domain, DomainError, Error, Face, LENGTH_HIGH, LENGTH_LOW, Neighbors, Particles,
     testing::Promise,
@@ -120,7 +121,7 @@ fn particles_one_ulp_around_a_periodic_face_meet_across_it() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn wrapped_coordinates_lie_in_the_box_and_stay_there(

@@ -1,6 +1,7 @@
 //! Half lists: every pair once, for both partners; sums over them beside the full ones.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use parops::{
     Allowance, Apply, BruteForce, CellList, Cutoff, D1, D2, Domain, Epsilon, Error, Exchange, Face, Form, Gradient,
     HalfList, Kernel, Laplacian, MultiIndex, Nearest, Neighbor, NeighborError, NeighborList, Neighbors, OperatorError,
@@ -91,7 +92,7 @@ fn stands_for_full_rows<const D: usize>(kinds: [usize; 3], shape: usize, n: usiz
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases() / 4, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(properties(cases() / 4))]
 
     #[test]
     fn half_list_stands_for_the_rows_of_brute_force(

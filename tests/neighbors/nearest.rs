@@ -1,6 +1,7 @@
 //! The provider of nearest neighbors: a provider like any other, whole shells, whatever the spacing.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use parops::testing::{Promise, check_provider, check_provider_against};
 use parops::{BruteForce, CellList, Cutoff, DcPse, Domain, Face, Laplacian, Nearest, Neighbors, Particles, Random};
 use proptest::prelude::*;
@@ -80,7 +81,7 @@ fn sets_with_fewer_neighbors_than_asked_for_are_served_with_all_there_are() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn cutoff_is_the_distance_of_neighbor_number_k(seed: u64, count in 3..40_usize, k in 1..12_usize) {

@@ -1,15 +1,12 @@
 //! Providers against brute force, as sets, in bits; boundaries, ties, poor sets; foreign providers.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use parops::{
     BruteForce, CellList, Cutoff, Domain, Error, Face, LENGTH_HIGH, LENGTH_LOW, Neighbor, NeighborError, NeighborList,
     Neighbors, ParticleError, Particles, Random, Stencil, testing::Promise,
 };
 use proptest::prelude::*;
-
-fn config(cases: u32) -> ProptestConfig {
-    ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
-}
 
 /// One row as a sorted set of (source, bits of the separation, sign).
 fn row<P: Neighbors<D>, const D: usize>(provider: &P, p: usize, cutoff: f64) -> Vec<(usize, [u64; D], i8)> {
@@ -96,7 +93,7 @@ fn cell_list_equals_oracle<const D: usize>(kinds: [usize; 3], shape: usize, n: u
 }
 
 proptest! {
-    #![proptest_config(config(cases()))]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn cell_list_equals_brute_force_on_small_sets(
@@ -113,7 +110,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(config(cases() / 25))]
+    #![proptest_config(properties(cases() / 25))]
 
     #[test]
     fn cell_list_equals_brute_force_on_larger_sets(

@@ -1,6 +1,7 @@
 //! The Verlet list against brute force after every update; when it searches anew, and when it need not.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use parops::testing::{Promise, check_provider, check_provider_against};
 use parops::{
     BruteForce, CellList, Cutoff, Domain, DomainError, Error, Face, NeighborError, NeighborList, Neighbors,
@@ -87,7 +88,7 @@ fn equals_brute_force<const D: usize>(kinds: [usize; 3], shape: usize, n: usize,
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases() / 10, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(properties(cases() / 10))]
 
     #[test]
     fn verlet_list_equals_brute_force_after_every_update(

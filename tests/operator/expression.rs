@@ -3,16 +3,13 @@
 use std::fmt::{Debug, Display};
 
 use crate::cases::cases;
+use crate::properties::properties;
 use parops::{
     Along, AlongTwice, Beta, BiLaplacian, D1, D2, D3, Divergence, ErrorKind, Expression, Gradient, Hessian,
     Homogeneous, Laplacian, MultiIndex, MultiIndexError, Operator, Outputs, Plus, Times,
 };
 use proptest::prelude::*;
 use typenum::{U0, U1, U2, Unsigned, tarr};
-
-fn config() -> ProptestConfig {
-    ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() }
-}
 
 /// Output, exponents, bits of the factor.
 type Bits<const D: usize> = (usize, [u8; D], u64);
@@ -210,7 +207,7 @@ fn outputs_are_converted_value_by_value() {
 }
 
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn factors_reach_the_terms_with_the_bits_of_their_product(a in any::<f64>(), b in any::<f64>(), c in any::<f64>()) {

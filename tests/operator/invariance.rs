@@ -5,16 +5,13 @@
 //! `Set::bound` takes the suprema of eta, z . grad eta and grad eta over a grid of differences.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use parops::{
     Allowance, Apply, BruteForce, CellList, Cutoff, Domain, Epsilon, Exchange, Expression, Gradient, HighOrderGaussian,
     Kernel, Laplacian, MultiIndex, Neighbors, Particles, Pse, Random, Row, Rows, Sign, SmoothingKernel, Sph, SphForm,
     Term, Volumes, testing::Promise,
 };
 use proptest::prelude::*;
-
-fn config() -> ProptestConfig {
-    ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() }
-}
 
 const N: usize = 20;
 
@@ -195,7 +192,7 @@ fn rounding(text: &'static str, size: f64) -> Promise {
 }
 
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn m1_exact_translation_leaves_every_bit(seed: u64, choice in choice(), t in [-1048576..1048576_i32, -1048576..1048576]) {

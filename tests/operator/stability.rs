@@ -1,6 +1,7 @@
 //! Step limits: lambda_max on lattices against reference values, and what is refused.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use parops::{
     Allowance, Apply, Binding, Cutoff, Epsilon, Error, ErrorKind, Euler, Exchange, Exponential, Kernel, Laplacian,
     LatticeSpectrum, Leapfrog, MultiIndex, Neighbor, NeighborError, Neighbors, OperatorError, ParticleError, Plan,
@@ -9,10 +10,6 @@ use parops::{
 };
 use proptest::prelude::*;
 use serde_json::Value;
-
-fn config() -> ProptestConfig {
-    ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() }
-}
 
 fn table(text: &str) -> Value {
     serde_json::from_str(text).unwrap()
@@ -399,7 +396,7 @@ fn spectral_radius(rows: &Rows<[f64; 1]>, volumes: &[f64]) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn row_bounds_of_pse_bound_the_spectrum_on_any_particle_set(

@@ -3,6 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::cases::cases;
+use crate::properties::properties;
 use nalgebra::{Complex, DMatrix, DVector, SVector};
 use parops::{
     Allowance, BiCgStab, BoundaryCondition, BoundaryRows, CellList, CsrMatrix, Cutoff, DcPse, Domain, Epsilon, Error,
@@ -10,10 +11,6 @@ use parops::{
     testing::Promise,
 };
 use proptest::prelude::*;
-
-fn config() -> ProptestConfig {
-    ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() }
-}
 
 fn linear(error: &Error) -> LinearError {
     match error.kind() {
@@ -441,7 +438,7 @@ fn systems_that_cannot_be_solved_are_refused_and_change_nothing() {
 }
 
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn steps_satisfy_their_equations(seed in any::<u64>(), n in 1_usize..20, dt in 1e-3..1e3_f64, mask in any::<u32>()) {

@@ -4,6 +4,7 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::cases::cases;
+use crate::properties::properties;
 use nalgebra::{Complex, DVector, SVector, Vector3};
 use parops::{
     Apply, CellList, Domain, Epsilon, Error, ErrorKind, Euler, Exponential, Laplacian, Leapfrog, ParticleError,
@@ -11,10 +12,6 @@ use parops::{
     testing::Promise,
 };
 use proptest::prelude::*;
-
-fn config() -> ProptestConfig {
-    ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() }
-}
 
 fn kind(error: Error) -> ErrorKind {
     error.kind().clone()
@@ -465,7 +462,7 @@ fn plans_refuse_illegal_spans_and_steps_that_make_no_progress() {
 }
 
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn plans_take_the_fewest_steps_that_keep_step_and_limit(

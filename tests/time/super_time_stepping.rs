@@ -2,6 +2,7 @@
 //! explicit schemes on particle sets.
 
 use crate::cases::cases;
+use crate::properties::properties;
 use nalgebra::{Complex, DMatrix, SymmetricEigen};
 use parops::{
     Allowance, Apply, CellList, Cutoff, DcPse, Domain, Epsilon, Error, ErrorKind, Euler, Exponential, Laplacian,
@@ -9,10 +10,6 @@ use parops::{
     integrate, testing::Promise,
 };
 use proptest::prelude::*;
-
-fn config() -> ProptestConfig {
-    ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() }
-}
 
 fn time(error: Error) -> TimeError {
     match error.kind() {
@@ -140,7 +137,7 @@ fn super_time_stepping_is_chosen_by_the_rate_and_refused_for_rows_that_do_not_su
 }
 
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(properties(cases()))]
 
     #[test]
     fn stages_and_substeps_chosen_keep_the_limit_and_are_the_fewest(exponent in -3.0..9.0_f64, dt in 1e-3..1e3_f64) {

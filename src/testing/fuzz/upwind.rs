@@ -39,7 +39,7 @@ impl<const D: usize> Judge<D> for OneWay<D> {
     }
 
     fn certify(&mut self, made: &Made<D>) -> Checked {
-        let Made { p, stencil, weights, diagonal, report, eps, .. } = *made;
+        let Made { p, stencil, weights, diagonal, report, eps, least } = *made;
         let v = self.velocities[p];
         let signed: Vec<f64> = stencil.signs().iter().zip(weights).map(|(&sign, w)| w * f64::from(sign)).collect();
         let lost: f64 = stencil.signs().iter().zip(&signed).filter(|(sign, _)| **sign < 0).map(|(_, w)| -2.0 * w).sum();
@@ -58,8 +58,10 @@ impl<const D: usize> Judge<D> for OneWay<D> {
             let slopes = || stencil.separations().iter().zip(&signed).map(|(s, w)| -w * s[axis]);
             let others: f64 = (0..D).filter(|&other| other != axis).map(|other| v[other].abs()).sum();
             let size: f64 = slopes().map(f64::abs).sum::<f64>() + v[axis].abs();
-            // Each weight is a sum of D products of five factors, and the moment a sum of n terms.
-            let rounding = 4.0 * (stencil.len() as f64 + 8.0) * eps * size;
+            // Each weight is a sum of D products of five factors, and the moment a sum of n terms; of a velocity near the
+            // least number only multiples of that are left.
+            let lost: f64 = stencil.separations().iter().map(|s| 1.0 + (D + 1) as f64 * s[axis].abs()).sum();
+            let rounding = 4.0 * (stencil.len() as f64 + 8.0) * eps * size + lost * least;
             close("a slope", p, slopes().sum(), v[axis], others * report.moment_defect * 1.001 + rounding)?;
         }
         Ok(())
