@@ -61,6 +61,8 @@ pub struct Lagrangian<const D: usize, S: MovingScene<D>, St> {
     pub(super) surveyed: u64,
     pub(super) sharp: Vec<(Limit, Rate)>,
     pub(super) remesher: Option<Box<dyn Remesher<D, S::Value>>>,
+    /// Turns of the remesher so far.
+    pub(super) turns: u64,
     pub(super) watch: Option<OverlapWatch<D>>,
     pub(super) ledger: LedgerRow<D>,
     /// Masses at the start.
@@ -113,6 +115,7 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
             surveyed: 0,
             sharp: Vec::new(),
             remesher: None,
+            turns: 0,
             watch: None,
             ledger: LedgerRow::new(S::Value::FIELDS),
             start: Vec::new(),

@@ -4,7 +4,7 @@ use super::fields::Fields;
 use super::flow::Flow;
 use super::lagrangian::Lagrangian;
 use super::ledger::Totals;
-use super::moving::{MovingScene, MovingState, wrapped};
+use super::moving::{Held, MovingScene, MovingState, wrapped};
 use super::moving_diffusion::MovingDiffusion;
 use super::saved::SavedParticles;
 use crate::apply::Report;
@@ -45,6 +45,7 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
             step: self.ledger.step,
             retries: self.ledger.retries,
             remeshings: self.ledger.remeshings,
+            turns: self.turns,
             start: self.start.clone(),
             dropped: dropped(|field| field.dropped),
             dropped_size: dropped(|field| field.dropped_size),
@@ -84,8 +85,9 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
         let points = wrapped(saved.points.as_chunks().0, &self.moving.domain)?;
         let particles = Particles::new(points)?.with_volumes(Volumes::each(saved.volumes)?)?;
         let kept = self.moving.resumed(&particles, saved.searched_at.as_chunks().0, saved.searches)?;
-        self.state = self.moving.replace(particles, saved.strengths, kept)?;
-        (self.t, self.start, self.stepper, self.surveyed) = (saved.t, saved.start, saved.stepper, saved.surveyed);
+        (self.moving.held, self.state) = Held::new(particles, saved.strengths, kept)?;
+        (self.t, self.start, self.stepper) = (saved.t, saved.start, saved.stepper);
+        (self.turns, self.surveyed) = (saved.turns, saved.surveyed);
         let ledger = &mut self.ledger;
         ledger.growth = saved.growth.unwrap_or(f64::NAN);
         (ledger.t, ledger.step, ledger.retries) = (saved.t, saved.step, saved.retries);

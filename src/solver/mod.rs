@@ -10,6 +10,7 @@
 //! that stay, [`Lagrangian`] for particles that the flow carries: there [`Flow`] and [`MovingDiffusion`] are the seams.
 
 mod advection;
+mod attempt;
 mod carried;
 mod central;
 mod coefficient;

@@ -52,16 +52,38 @@ impl<S, const D: usize> MovingScene<D> for S where
 type KeptOf<const D: usize, S> = <<S as Scene<D>>::Diffusion as MovingDiffusion<D, <S as Scene<D>>::Value>>::Kept;
 type ValuesOf<const D: usize, S> = <<S as Scene<D>>::Advection as Flow<D>>::Values;
 
-/// The right-hand side. Its particles are those of the last stage; what the scene leaves as it is, it holds.
-pub(super) struct Moving<const D: usize, S: MovingScene<D>> {
-    pub(super) scene: S,
-    pub(super) domain: Domain<D>,
+/// The particles of the last stage with their neighbors, and what of them the scene leaves as it is.
+pub(super) struct Held<const D: usize, S: MovingScene<D>> {
     pub(super) site: Site<D>,
     kept: KeptOf<D, S>,
     values: ValuesOf<D, S>,
     /// Strengths and volumes that no term changes.
     omega: Vec<S::Value>,
     volume: Vec<f64>,
+}
+
+impl<const D: usize, S: MovingScene<D>> Held<D, S> {
+    /// Particles of these strengths, and their state.
+    pub(super) fn new(
+        particles: Particles<D>,
+        omega: Vec<S::Value>,
+        kept: KeptOf<D, S>,
+    ) -> Result<(Self, MovingState<D, S::Value>)> {
+        let volumes = particles.volumes()?;
+        let volume = (0..particles.len()).map(|p| volumes.get(p)).collect::<Result<Vec<f64>>>()?;
+        let points = if S::Advection::MOVES { particles.points().to_vec() } else { Vec::new() };
+        let (own, omega) = if Moving::<D, S>::EXCHANGES { (Vec::new(), omega) } else { (omega, Vec::new()) };
+        let (fixed, volume) = if S::Advection::SOLENOIDAL { (volume, Vec::new()) } else { (Vec::new(), volume) };
+        let site = Site::moving(particles);
+        Ok((Self { site, kept, values: Default::default(), omega: own, volume: fixed }, (points, (omega, volume))))
+    }
+}
+
+/// The right-hand side.
+pub(super) struct Moving<const D: usize, S: MovingScene<D>> {
+    pub(super) scene: S,
+    pub(super) domain: Domain<D>,
+    pub(super) held: Held<D, S>,
     u: Vec<S::Value>,
     places: Vec<[f64; D]>,
     spare: Volumes,
@@ -89,67 +111,29 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         }
         scene.advection_term().validate(needed)?;
         let volumes = particles.volumes()?;
-        let volume = (0..needed).map(|p| volumes.get(p)).collect::<Result<Vec<f64>>>()?;
-        let omega = u.iter().zip(&volume).map(|(&u, &volume)| S::Value::ZERO.plus(volume, u)).collect();
-        let points = wrapped(particles.points(), domain)?;
-        let mut particles = particles.clone();
-        particles.set_points(&points)?;
+        let mut omega = Vec::with_capacity(needed);
+        for (p, &u) in u.iter().enumerate() {
+            omega.push(S::Value::ZERO.plus(volumes.get(p)?, u));
+        }
+        let particles = Particles::new(wrapped(particles.points(), domain)?)?.with_volumes(volumes.clone())?;
         let kept = scene.diffusion_term().start(&particles, domain, settings)?;
-        let mut moving = Self {
+        let (held, state) = Held::new(particles, omega, kept)?;
+        let moving = Self {
             scene,
             domain: *domain,
-            site: Site::moving(particles),
-            kept,
-            values: Default::default(),
-            omega: Vec::new(),
-            volume: Vec::new(),
+            held,
             u: Vec::new(),
             places: Vec::new(),
             spare: Volumes::equal(1.0)?,
             spread: Vec::new(),
             spread_at: None,
         };
-        let state = moving.take(points, omega, volume);
         Ok((moving, state))
-    }
-
-    /// The state of these particles; what no term changes stays here.
-    fn take(&mut self, points: Vec<[f64; D]>, omega: Vec<S::Value>, volume: Vec<f64>) -> MovingState<D, S::Value> {
-        let points = if S::Advection::MOVES { points } else { Vec::new() };
-        let omega = if Self::EXCHANGES {
-            omega
-        } else {
-            self.omega = omega;
-            Vec::new()
-        };
-        let volume = if S::Advection::SOLENOIDAL {
-            self.volume = volume;
-            Vec::new()
-        } else {
-            volume
-        };
-        (points, (omega, volume))
-    }
-
-    /// Other particles with these strengths in the place of those there were.
-    pub(super) fn replace(
-        &mut self,
-        particles: Particles<D>,
-        omega: Vec<S::Value>,
-        kept: KeptOf<D, S>,
-    ) -> Result<MovingState<D, S::Value>> {
-        let volumes = particles.volumes()?;
-        let volume = (0..particles.len()).map(|p| volumes.get(p)).collect::<Result<Vec<f64>>>()?;
-        let points = particles.points().to_vec();
-        self.kept = kept;
-        self.values = Default::default();
-        self.site = Site::moving(particles);
-        Ok(self.take(points, omega, volume))
     }
 
     /// The neighbors of other particles, with the settings of now.
     pub(super) fn restart(&self, particles: &Particles<D>) -> Result<KeptOf<D, S>> {
-        self.scene.diffusion_term().restart(&self.kept, particles, self.searches().0 + 1)
+        self.scene.diffusion_term().restart(&self.held.kept, particles, self.searches().0 + 1)
     }
 
     /// The neighbors of particles that were last searched at other places, as search number `searches`.
@@ -163,30 +147,30 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         if <S::Diffusion as MovingDiffusion<D, S::Value>>::SPREADS {
             before.set_points(searched_at)?;
         }
-        let mut kept = self.scene.diffusion_term().restart(&self.kept, &before, searches)?;
+        let mut kept = self.scene.diffusion_term().restart(&self.held.kept, &before, searches)?;
         self.scene.diffusion_term().follow(&mut kept, particles)?;
         Ok(kept)
     }
 
     pub(super) fn points<'a>(&'a self, state: &'a MovingState<D, S::Value>) -> &'a [[f64; D]] {
-        if S::Advection::MOVES { &state.0 } else { self.site.points() }
+        if S::Advection::MOVES { &state.0 } else { self.held.site.points() }
     }
 
     pub(super) fn omega<'a>(&'a self, state: &'a MovingState<D, S::Value>) -> &'a [S::Value] {
-        if Self::EXCHANGES { &state.1.0 } else { &self.omega }
+        if Self::EXCHANGES { &state.1.0 } else { &self.held.omega }
     }
 
     pub(super) fn volume<'a>(&'a self, state: &'a MovingState<D, S::Value>) -> &'a [f64] {
-        if S::Advection::SOLENOIDAL { &self.volume } else { &state.1.1 }
+        if S::Advection::SOLENOIDAL { &self.held.volume } else { &state.1.1 }
     }
 
     /// How often the neighbors were searched anew, and where the particles were then.
     pub(super) fn searches(&self) -> (u64, &[[f64; D]]) {
-        self.scene.diffusion_term().searches(&self.kept)
+        self.scene.diffusion_term().searches(&self.held.kept)
     }
 
     pub(super) fn admits(&self, spacing: crate::scale::Spacing) -> Result<()> {
-        self.scene.diffusion_term().admits(&self.kept, spacing)
+        self.scene.diffusion_term().admits(&self.held.kept, spacing)
     }
 
     /// Brings the particles to the places and volumes of a state at time t.
@@ -199,17 +183,17 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
             for (p, x) in state.0.iter().enumerate() {
                 self.places.push(self.domain.wrap(x).map_err(|error| error.at(p))?);
             }
-            self.site.particles_mut().set_points(&self.places)?;
+            self.held.site.particles_mut().set_points(&self.places)?;
         }
         if !S::Advection::SOLENOIDAL {
             // The diffusion term shares the volumes of before until it follows; those before them are free.
-            let mut volumes = std::mem::replace(&mut self.spare, self.site.particles().volumes()?.clone());
+            let mut volumes = std::mem::replace(&mut self.spare, self.held.site.particles().volumes()?.clone());
             volumes.renew(&state.1.1)?;
-            self.site.particles_mut().set_volumes(volumes)?;
+            self.held.site.particles_mut().set_volumes(volumes)?;
         }
-        self.scene.advection_term().renew(&mut self.values, &self.site, &self.domain, t)?;
+        self.scene.advection_term().renew(&mut self.held.values, &self.held.site, &self.domain, t)?;
         if S::Advection::MOVES {
-            self.scene.diffusion_term().follow(&mut self.kept, self.site.particles())?;
+            self.scene.diffusion_term().follow(&mut self.held.kept, self.held.site.particles())?;
         }
         Ok(())
     }
@@ -237,7 +221,7 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         if Self::EXCHANGES {
             self.evaluate(state);
         }
-        let (flow, values, points) = (self.scene.advection_term(), &self.values, self.site.points());
+        let (flow, values, points) = (self.scene.advection_term(), &self.held.values, self.held.site.points());
         let (dx, (domega, dvolume)) = rates;
         if S::Advection::MOVES {
             each_row(dx, |p| flow.at(p, &points[p], t));
@@ -254,7 +238,7 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
             if known {
                 each_row(domega, |p| finish(p, self.spread[p]));
             } else {
-                self.scene.diffusion_term().rates(&self.kept, u, domega, finish)?;
+                self.scene.diffusion_term().rates(&self.held.kept, u, domega, finish)?;
             }
         }
         Ok(())
@@ -276,16 +260,16 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         }
         let mut limits = Limits::default();
         self.spread.resize(self.u.len(), S::Value::ZERO);
-        let checked = self.scene.diffusion_term().check(&self.kept, &self.u, &mut self.spread)?;
+        let checked = self.scene.diffusion_term().check(&self.held.kept, &self.u, &mut self.spread)?;
         self.spread_at = checked.is_some().then_some(t);
         if let Some((report, factor)) = &checked {
             limits.add(Limit::Diffusion, Rate::decay(factor * report.spectral_bound));
         }
         let flow = self.scene.advection_term();
-        flow.bound(&self.values, &self.site, &self.domain, t, courant, &mut limits)?;
+        flow.bound(&self.held.values, &self.held.site, &self.domain, t, courant, &mut limits)?;
         if dt > 0.0 && !SceneTerm::<D, S::Value>::steady(flow) {
             let mut end = Limits::default();
-            flow.bound(&self.values, &self.site, &self.domain, t + dt, courant, &mut end)?;
+            flow.bound(&self.held.values, &self.held.site, &self.domain, t + dt, courant, &mut end)?;
             limits = limits.larger(&end);
         }
         if checked.is_none() {
@@ -293,22 +277,22 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
             limits.set(Limit::Compression, Rate::default());
         }
         if <S::Source as SceneTerm<D, S::Value>>::PRESENT {
-            self.scene.source_term().limit(&mut (), &self.site, t, &self.u, &mut limits)?;
+            self.scene.source_term().limit(&mut (), &self.held.site, t, &self.u, &mut limits)?;
         }
         Ok((limits, checked.map(|(report, _)| report)))
     }
 
     /// The rightmost eigenvalue and the spectral radius of the diffusion rows of now, in so many products each.
     pub(super) fn spectrum(&self, products: usize) -> Result<Spectrum> {
-        self.scene.diffusion_term().spectrum(&self.kept, products)
+        self.scene.diffusion_term().spectrum(&self.held.kept, products)
     }
 
     /// Whether V_p w_pq = V_q w_qp in the rows of now, found by applying them to two fields.
     pub(super) fn symmetry(&self, state: &MovingState<D, S::Value>) -> Result<RowSymmetry> {
-        let fields = probes::<S::Value>(self.site.points().len());
+        let fields = probes::<S::Value>(self.held.site.points().len());
         let mut images = fields.clone();
         for (u, image) in fields.iter().zip(&mut images) {
-            self.scene.diffusion_term().rates(&self.kept, u, image, |_, rate| rate)?;
+            self.scene.diffusion_term().rates(&self.held.kept, u, image, |_, rate| rate)?;
         }
         let volumes = self.volume(state);
         Ok(symmetry(&fields, &images, |p| volumes.get(p).copied().unwrap_or(1.0)))

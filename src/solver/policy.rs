@@ -7,8 +7,9 @@ pub enum StepPolicy {
     /// It is refused before anything changes.
     #[default]
     Refuse,
-    /// It is cut into substeps, each within the limit of its own moment; the ledger counts them. Remeshing waits for the
-    /// end of the step, and finds the set as distorted as the whole step leaves it.
+    /// It is cut into substeps, each within the limit of its own moment; the ledger counts them. Remeshed particles have a
+    /// turn to be replaced before each substep that would take their distortion since the last turn above its limit, so
+    /// that a step cut for distortion gives what the shorter steps give.
     Adapt {
         /// The most substeps of one step; where more are needed the step is refused.
         most: u32,

@@ -10,10 +10,13 @@ use crate::particles::Particles;
 use crate::scale::{Cutoff, Spacing};
 
 /// When particles are replaced.
+///
+/// They have a turn after every step, and within a step that is cut ([`StepPolicy::Adapt`](super::StepPolicy::Adapt)) before
+/// each substep that would take the sum of dt |grad v|_2 since the last turn above its limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Trigger {
-    /// After every so many steps.
+    /// At one of so many turns: after every so many steps, where distortion cuts none.
     Steps(u64),
     /// When overlap is lost: as soon as the largest hole ([`fill_distance`]) is wider than `hole` or the least gap
     /// ([`least_gap`]) narrower than `gap`, both in spacings of the mesh. A fresh mesh has a hole of sqrt(D)/2 and a gap of

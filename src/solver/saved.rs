@@ -38,6 +38,8 @@ pub struct SavedParticles<E, St> {
     pub retries: u64,
     /// Remeshings so far.
     pub remeshings: u64,
+    /// Turns to be replaced so far, see [`Trigger`](super::Trigger).
+    pub turns: u64,
     /// The mass of every field at the start.
     pub start: Vec<f64>,
     /// Strength dropped so far, field by field.

@@ -7,7 +7,7 @@ use super::moving::{MovingScene, MovingState};
 use super::remeshing::{hole_of, spacings};
 use crate::domain::Domain;
 use crate::error::{Result, SolverError};
-use crate::mesh::{Mesh, Remeshed};
+use crate::mesh::Mesh;
 use crate::neighbors::{CellList, least_gap};
 use crate::particles::Particles;
 use crate::scale::Cutoff;
@@ -81,29 +81,15 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
 
     /// The largest hole and the least gap after a step, where they are due; refuses what is lost, and a mass that has
     /// drifted.
-    pub(super) fn watched(
-        &mut self,
-        work: &MovingState<D, S::Value>,
-        t: f64,
-        fresh: Option<&Remeshed<S::Value, D>>,
-    ) -> Result<Option<(f64, f64)>> {
-        let (points, strengths) = match fresh {
-            Some(fresh) => (fresh.particles.points(), fresh.strengths.as_slice()),
-            None => (self.moving.points(work), self.moving.omega(work)),
-        };
+    pub(super) fn watched(&mut self, work: &MovingState<D, S::Value>, t: f64) -> Result<Option<(f64, f64)>> {
+        let (points, strengths) = (self.moving.points(work), self.moving.omega(work));
         let strength = |p: usize, i: usize| strengths.get(p).map_or(0.0, |omega| omega.get(i));
         check_drift::<D, S::Value>(points, strength, &self.start, self.ledger.budget)?;
         let Some(watch) = self.watch.filter(|watch| (self.ledger.step + 1).is_multiple_of(watch.every)) else {
             return Ok(None);
         };
-        let particles = match fresh {
-            Some(fresh) => &fresh.particles,
-            None => {
-                self.moving.place(t, work)?;
-                self.moving.site.particles()
-            }
-        };
-        watch.measure(particles, &self.moving.domain).map(Some)
+        self.moving.place(t, work)?;
+        watch.measure(self.moving.held.site.particles(), &self.moving.domain).map(Some)
     }
 }
 

@@ -16,6 +16,7 @@ mod lagrangian;
 mod lagrangian_growth;
 mod relations;
 mod remeshed;
+mod remeshed_substeps;
 mod resume;
 mod scene;
 mod sharp_limits;

@@ -16,7 +16,7 @@ fn every_step<const D: usize, K>(kernel: K, mesh: Mesh<D>) -> Remeshing<D, K> {
 }
 
 /// Where a particle of the flow 1 + sin(x)/2 was a time t before.
-fn origin(x: f64, t: f64) -> f64 {
+pub(super) fn origin(x: f64, t: f64) -> f64 {
     const STEPS: u32 = 150;
     let (mut x, dt) = (x, -t / f64::from(STEPS));
     let v = |x: f64| 1.0 + 0.5 * x.sin();

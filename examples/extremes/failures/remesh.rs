@@ -112,30 +112,27 @@ pub fn lcfl(case: &mut Case, _: bool) -> Done {
     };
     let (legal, _) = of_both(&|_| limit, StepPolicy::Refuse)?;
     let (fine, _) = of_both(&|_| limit / 16.0, StepPolicy::Refuse)?;
+    let cut = StepPolicy::Adapt { most: 8 };
+    let (whole, parts) = of_both(&|dt| dt, cut)?;
     case.adapts(
-        below(&legal, 0.4, &errors) && fine.iter().all(|error| *error < 1e-3),
+        below(&whole, 0.4, &errors) && below(&whole, 1.01, &legal) && fine.iter().all(|error| *error < 1e-3) && parts > 0,
         format!(
-            "dt cut to what the refusal names, remeshed after each step: errors {}, with a sixteenth of it {}",
+            "policy adapt cuts the steps and remeshes after each part: errors {}; {} with the longest legal steps, {} with a sixteenth of them",
+            listed(whole),
             listed(legal),
             listed(fine)
         ),
     );
-    let cut = StepPolicy::Adapt { most: 8 };
     // Without it steps of 3 would leave a volume below zero.
     let (long, _) = finished(false, 2.0 * STEPS[0], STEPS[0], StepPolicy::Allow)?;
     let (short, parts) = finished(false, 2.0 * STEPS[0], STEPS[0], cut)?;
     case.adapts(
         short < 0.1 * long && parts > 0,
-        format!("policy adapt cuts the paths: without remeshing the error is {short:.1e} in place of {long:.1e}"),
-    );
-    let (whole, parts) = of_both(&|dt| dt, cut)?;
-    case.reports(
-        below(&whole, 1.0, &errors) && below(&errors, 2.0, &whole) && parts > 0,
-        format!("it is no cure for the distortion: remeshed after the last substep of each step the errors are {}, those of true paths with the naive remeshing", listed(whole)),
+        format!("it cuts the paths too: without remeshing the error is {short:.1e} in place of {long:.1e}"),
     );
     case.documents(
         include_str!("../../../src/solver/policy.rs"),
-        "Remeshing waits for the end of the step, and finds the set as distorted as the whole step leaves it.",
+        "a step cut for distortion gives what the shorter steps give",
     );
     Ok(())
 }
