@@ -4,8 +4,11 @@
 //! sum of z^(beta - 2k) g_(|beta| - |k|). Each g_m is kept as a sum of parts (edge - r)^a r^-b P(r) in which nothing
 //! cancels at the edge, and b is the true pole at r = 0: it is lower than the degree of the z^(beta - 2k) it meets.
 
+use std::array;
+
 use super::BLOCK;
-use super::exchange::horner;
+use super::decay::in_lanes;
+use super::exchange::{horner, horner_lanes};
 use super::high_order::{constant, for_each_half};
 use crate::error::{KernelError, Result};
 use crate::multi_index::{MultiIndex, Term};
@@ -22,6 +25,16 @@ pub(super) struct Part {
     pub(super) coefficients: Vec<f64>,
 }
 
+/// t^exponent P(t) or, where P is `radial`, t^exponent P(r), with t = edge - r kept within 0 and `width`.
+#[derive(Clone, Debug)]
+pub(super) struct Step {
+    pub(super) edge: f64,
+    pub(super) width: f64,
+    pub(super) exponent: u32,
+    pub(super) radial: bool,
+    pub(super) coefficients: Vec<f64>,
+}
+
 /// W(z) = sum of parts of g_0 over their integral.
 #[derive(Clone, Debug)]
 pub(super) struct Compact<const D: usize> {
@@ -32,6 +45,8 @@ pub(super) struct Compact<const D: usize> {
     pub(super) front: f64,
     /// The sum of parts of g_0 where the profile w, as the docs of the kernel state it, is 1.
     pub(super) unit: f64,
+    /// g_0 as a sum of terms that do not cancel.
+    steps: Vec<Step>,
     /// The parts of g_0, g_1, ..., one entry a degree.
     derivatives: Vec<Vec<Part>>,
 }
@@ -104,9 +119,16 @@ impl Part {
 }
 
 impl<const D: usize> Compact<D> {
-    /// The kernel with the parts `whole`, all of low = 0; `split` has the same sum and is what is differentiated, up to
-    /// degree `limit`.
-    pub(super) fn new(name: &'static str, whole: Vec<Part>, split: Vec<Part>, unit: f64, limit: u32) -> Self {
+    /// The kernel with the parts `whole`, all of low = 0; `steps` and `split` have the same sum, `split` is what is
+    /// differentiated, up to degree `limit`.
+    pub(super) fn new(
+        name: &'static str,
+        whole: Vec<Part>,
+        steps: Vec<Step>,
+        split: Vec<Part>,
+        unit: f64,
+        limit: u32,
+    ) -> Self {
         let support = whole.iter().fold(0.0, |support: f64, part| support.max(part.edge));
         let integral: f64 = whole.iter().map(Part::radial_integral::<D>).sum();
         let mut derivatives = vec![whole];
@@ -116,28 +138,37 @@ impl<const D: usize> Compact<D> {
             derivatives.push(parts.clone());
         }
         let term = [Term { index: MultiIndex::ZERO, factor: 1.0 }];
-        Self { name, term, support, front: 1.0 / (sphere::<D>() * integral), unit, derivatives }
+        Self { name, term, support, front: 1.0 / (sphere::<D>() * integral), unit, steps, derivatives }
     }
 
     #[inline]
     pub(super) fn value<T: Scalar>(&self, z: &[T; D]) -> T {
-        let mut out = [T::zero()];
-        self.values(std::slice::from_ref(z), &mut out);
-        out[0]
+        let [value] = self.at(&[*z]);
+        value
     }
 
     #[inline]
     pub(super) fn values<T: Scalar>(&self, z: &[[T; D]], out: &mut [T]) {
-        for (z, out) in z.iter().zip(&mut *out) {
-            let r = length(z);
-            *out = T::zero();
-            for part in &self.derivatives[0] {
-                // At the edge a part is 0 by itself; beyond it powers of r may overflow. NaN stays.
-                let r = if r >= T::lift(part.edge) { T::lift(part.edge) } else { r };
-                *out += power(T::lift(part.edge) - r, part.exponent) * horner(&part.coefficients, r);
+        in_lanes(z, out, |z| self.at(z));
+    }
+
+    /// W at L points.
+    #[inline(always)]
+    fn at<T: Scalar, const L: usize>(&self, z: &[[T; D]; L]) -> [T; L] {
+        // Comparisons are written so that NaN stays and no branch is needed.
+        let lengths: [T; L] = array::from_fn(|i| length(&z[i]));
+        let mut sum = [T::zero(); L];
+        for step in &self.steps {
+            let (edge, width) = (T::lift(step.edge), T::lift(step.width));
+            // Beyond the edge powers of r may overflow. At a knot one step alone may have a derivative for dual numbers.
+            let r = lengths.map(|r| if r >= edge { edge } else { r });
+            let t = r.map(|r| edge - r).map(|t| if t > width { width } else { t });
+            let polynomial = horner_lanes(&step.coefficients, if step.radial { &r } else { &t });
+            for i in 0..L {
+                sum[i] += power(t[i], step.exponent) * polynomial[i];
             }
-            *out *= T::lift(self.front);
         }
+        sum.map(|sum| sum * T::lift(self.front))
     }
 
     /// sum_i c_i D^beta_i W.

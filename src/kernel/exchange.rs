@@ -226,7 +226,7 @@ pub(super) fn horner<T: Scalar>(coefficients: &[f64], s: T) -> T {
 
 /// sum_k c_k s^k for several s side by side.
 #[inline(always)]
-fn horner_lanes<T: Scalar, const L: usize>(coefficients: &[f64], s: &[T; L]) -> [T; L] {
+pub(super) fn horner_lanes<T: Scalar, const L: usize>(coefficients: &[f64], s: &[T; L]) -> [T; L] {
     // Begun with the last coefficient, a constant stays one where s overflows.
     let Some((&last, others)) = coefficients.split_last() else { return [T::zero(); L] };
     others.iter().rev().fold([T::lift(last); L], |sum, &c| array::from_fn(|i| sum[i] * s[i] + T::lift(c)))

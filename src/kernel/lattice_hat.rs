@@ -48,9 +48,15 @@ impl<const D: usize> Default for LatticeHat<D> {
 impl<T: Scalar, const D: usize> Kernel<T, D> for LatticeHat<D> {
     #[inline]
     fn value(&self, z: &[T; D]) -> T {
-        let rest = z.iter().fold(T::lift(2.0), |rest, &x| rest - x.abs());
+        // What a difference loses is exact while it is positive, and later ones may cancel all the rest.
+        let (mut rest, mut lost) = (T::lift(2.0), T::zero());
+        for x in z {
+            let next = rest - x.abs();
+            lost += (rest - next) - x.abs();
+            rest = next;
+        }
         // Written so that NaN stays.
-        if rest <= T::zero() { T::zero() } else { rest }
+        if rest < T::zero() || rest + lost <= T::zero() { T::zero() } else { rest + lost }
     }
 
     fn terms(&self) -> &[Term<D>] {

@@ -1,6 +1,6 @@
 //! The cubic and the quintic B-spline, the classical smoothing kernels of SPH.
 
-use super::compact::{Compact, Part, compact_kernel};
+use super::compact::{Compact, Part, Step, compact_kernel};
 use super::{Kernel, SmoothingKernel};
 use crate::error::Result;
 use crate::multi_index::{MultiIndex, Term};
@@ -87,8 +87,9 @@ compact_kernel!(QuinticSpline, D == 1);
 
 /// The B-spline of odd degree n, sum_j (-1)^j C(n + 1, j) (R - j - r)_+^n, R = (n + 1)/2.
 ///
-/// Below r = 1 the truncated powers are expanded: there their odd powers of r below n cancel exactly, which would be
-/// the poles of their derivatives.
+/// Values are sums over the units of r: from its edge inwards each adds a polynomial in t = edge - r <= 1 that grows from 0.
+/// For derivatives the truncated powers are kept from r = 1 on, and below expanded: there their odd powers of r below n
+/// cancel exactly, which would be the poles of their derivatives.
 fn spline<const D: usize>(name: &'static str, n: u32) -> Compact<D> {
     let reach = n.div_ceil(2);
     let mut whole = Vec::new();
@@ -98,6 +99,21 @@ fn spline<const D: usize>(name: &'static str, n: u32) -> Compact<D> {
         whole.push(Part { low: 0.0, edge, exponent: n, pole: 0, coefficients: vec![weight] });
         weight *= -f64::from(n + 1 - j) / f64::from(j + 1);
     }
+    let steps = whole.iter().map(|inner: &Part| {
+        // Of t^k in sum_j c_j (t + edge_j - edge)^n, where t^0 is what is left of the others at t = 1.
+        let outer = || whole.iter().filter(|part| part.edge >= inner.edge);
+        let powers =
+            |k: u32| outer().map(move |part| part.coefficients[0] * (part.edge - inner.edge).powi((n - k) as i32));
+        let mut binomial = 1.0;
+        let all = (1..=n).map(|k| {
+            binomial *= f64::from(n + 1 - k) / f64::from(k);
+            binomial * powers(k).sum::<f64>()
+        });
+        let coefficients: Vec<f64> = all.skip_while(|&c| c == 0.0).collect();
+        let exponent = n + 1 - coefficients.len() as u32;
+        Step { edge: inner.edge, width: 1.0, exponent, radial: false, coefficients }
+    });
+    let steps = steps.collect();
     let mut inner = Vec::new();
     let mut binomial = 1.0;
     for i in 0..=n {
@@ -107,5 +123,5 @@ fn spline<const D: usize>(name: &'static str, n: u32) -> Compact<D> {
     }
     let mut split = vec![Part { low: 0.0, edge: 1.0, exponent: 0, pole: 0, coefficients: inner }];
     split.extend(whole.iter().filter(|part| part.edge > 1.0).map(|part| Part { low: 1.0, ..part.clone() }));
-    Compact::new(name, whole, split, 1.0, n - 1)
+    Compact::new(name, whole, steps, split, 1.0, n - 1)
 }

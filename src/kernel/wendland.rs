@@ -1,6 +1,6 @@
 //! The Wendland functions C2, C4 and C6, the polynomials of least degree that are positive definite.
 
-use super::compact::{Compact, Part, compact_kernel};
+use super::compact::{Compact, Part, Step, compact_kernel};
 use super::{Kernel, SmoothingKernel};
 use crate::error::Result;
 use crate::multi_index::{MultiIndex, Term};
@@ -135,6 +135,7 @@ fn wendland<const D: usize>(name: &'static str, k: u32, polynomial: impl Fn(f64)
         scale *= 0.5;
     }
     let unit = coefficients[0] * 2.0_f64.powi((l + k) as i32);
+    let steps = vec![Step { edge: 2.0, width: 2.0, exponent: l + k, radial: true, coefficients: coefficients.clone() }];
     let whole = vec![Part { low: 0.0, edge: 2.0, exponent: l + k, pole: 0, coefficients }];
-    Compact::new(name, whole.clone(), whole, unit, 2 * k)
+    Compact::new(name, whole.clone(), steps, whole, unit, 2 * k)
 }

@@ -15,4 +15,5 @@ mod rational;
 mod rational_laplacian;
 mod smoothing;
 mod stated;
+mod ulps;
 mod values;

@@ -346,6 +346,10 @@ fn agrees_with_dual_numbers<const D: usize>(name: &str, kernel: &impl Compact<D>
             let expected = derivative(kernel, MultiIndex::new(next), &z);
             let tolerance = DUAL * value(kernel, &[0.0; D]);
             assert!((found - expected).abs() <= tolerance, "{name} {beta} {axis} {z:?}: {found} {expected}");
+            if beta == MultiIndex::ZERO {
+                let found = Kernel::<Dual64, D>::value(kernel, &dual).eps;
+                assert!((found - expected).abs() <= tolerance, "{name} {axis} {z:?}: {found} {expected}");
+            }
         }
     }
 }
