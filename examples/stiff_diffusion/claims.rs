@@ -40,9 +40,10 @@ pub fn check(costs: &[Record], numbers: &[Record]) -> Vec<(String, bool)> {
         claims.push((format!("{set}: no scheme widens the field at numbers to 10^6"), stable && reached));
         let million = |scheme| steps.iter().find(|r| r.scheme == scheme && r.number > 0.99e6);
         let applies = million(Scheme::Rkl2).map_or(0, |r| r.applies);
+        // 2828 stages, or 64 a substep at the slope counted on, which reach 1023 of 2 10^6.
         claims.push((
             format!("{set}: RKL2 makes up for 10^6 explicit steps with {applies} applies"),
-            (1000..120_000).contains(&applies),
+            (1000..126_000).contains(&applies),
         ));
         let flat = million(Scheme::ImplicitEulerLu).map_or(f64::NAN, |r| r.left);
         claims.push((format!("{set}: a step of 10^6 by implicit Euler leaves {flat:.1e}"), flat < 0.1));

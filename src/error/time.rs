@@ -31,7 +31,7 @@ kinds! {
             /// The limit.
             limit: f64,
         } => "step {dt} is above the stability limit {limit}",
-        /// A number of stages that is not legal, or too large for the rows.
+        /// A number of stages that is not legal.
         Stages {
             /// Number of stages.
             stages: u32,
@@ -40,6 +40,15 @@ kinds! {
             /// Largest legal number.
             high: u32,
         } => "{stages} stages are outside {low} to {high}",
+        /// A slope |Im lambda| / |Re lambda| of eigenvalues that is not legal, or none where the rows need one.
+        Slope {
+            /// The slope.
+            slope: f64,
+            /// Smallest legal slope.
+            low: f64,
+            /// Largest legal slope.
+            high: f64,
+        } => "eigenvalues beside the real axis by a slope of {slope}, which is outside {low} to {high}",
         /// A right-hand side or state that is not finite.
         NotFinite {
             /// Stage of the stepper, from 1; one past the last for the new state.

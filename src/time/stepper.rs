@@ -47,7 +47,7 @@ pub trait Stepper<S: State> {
     /// Refuses rows that the scheme does not suit, for what is known of them; most schemes suit all.
     ///
     /// # Errors
-    /// [`TimeError::Stages`] for more stages of [`Rkl2`](crate::Rkl2) than rows that are not symmetric bear.
+    /// [`TimeError::Slope`] for rows that are not symmetric and [`Rkl2`](crate::Rkl2) that counts on no slope.
     fn check_symmetry(&self, symmetry: RowSymmetry) -> Result<()> {
         let _ = symmetry;
         Ok(())

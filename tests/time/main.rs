@@ -2,6 +2,8 @@
 
 #[path = "../cases/mod.rs"]
 mod cases;
+#[path = "../linear/dense/mod.rs"]
+mod dense;
 #[path = "../properties/mod.rs"]
 mod properties;
 
