@@ -133,7 +133,7 @@ fn sides(quick: bool, set: Set, dim: usize, method: &str, order: u32) -> &'stati
         (false, ..) if thin => &[20],
         (false, _, "DC-PSE") if order < 4 => &[12, 16, 20, 26],
         (false, _, "DC-PSE") if order < 6 || set == Set::Lattice => &[12, 16, 20],
-        (false, _, "DC-PSE") => &[12],
+        (false, _, "DC-PSE") => &[12, 16],
         (false, ..) if set == Set::Lattice => &[12, 16, 20],
         (false, ..) => &[12, 16],
     }
