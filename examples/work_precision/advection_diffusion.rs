@@ -37,14 +37,18 @@ const UPWIND_SUPPORT: f64 = 4.0;
 /// Particles along an axis of the sets that tell gamma.
 const COARSE: [usize; 3] = [16, 16, 10];
 
-/// How far an order may be below r.
+/// How far an order may be from where it must be.
 const BAND: f64 = 0.3;
 const PHASES: &str = "Particles that stay: build makes the rows, apply is the right-hand sides, step the rest of the steps. \
     Particles that move: build is the start of the run; step is all that steps do, search, rows and products included, and \
     remeshing.";
+const SETS: &str = "Particles that stay are scattered (jitter 0.2 h), those that move start on a lattice of as many and are \
+    remeshed onto it after every step: methods are compared on one problem, each on the set that it is used with. The gamma of \
+    the hyperviscosity is searched for on a small set before; the search is in none of the times.";
 
 pub fn run(bench: &mut Bench) -> Result<(), Box<dyn Error>> {
     bench.note(SCENE, PHASES);
+    bench.note(SCENE, SETS);
     let [plane, space, carried]: [&[usize]; 3] =
         if bench.quick { [&[24, 36], &[16, 24], &[14]] } else { [&[24, 36, 54, 81], &[16, 24, 32], &[14, 18, 22]] };
     each::<2>(bench, plane, plane)?;
@@ -203,17 +207,24 @@ fn moving<const D: usize, K: MeshKernel<f64, S> + 'static, const S: usize>(
     Ok(())
 }
 
-/// Every order shows.
+/// Every order shows. Remeshed after every step of a length in proportion to h, a kernel of exactness P adds an error of
+/// order P. Where that is above the order r of PSE, coarse sets show it and fine ones r: the order is between both.
 fn claims(bench: &mut Bench) {
     let mut found = Vec::new();
     for task in bench.table.tasks().iter().filter(|task| task.samples()[0].scene == SCENE) {
         for series in task.series().into_iter().filter(|series| series.len() > 1) {
             let (first, last) = (series[0], series[series.len() - 1]);
             let observed = observed_order([first.h, last.h], [first.error_l2, last.error_l2]).unwrap_or(0.0);
-            let least = f64::from(last.order) - BAND;
-            let text = format!("{}D, {}: observed order {observed:.2}, at least {least}", last.dim, last.label());
-            found.push((observed >= least, text));
+            let (order, exactness) = (f64::from(last.order), exactness(last).unwrap_or(0.0));
+            let (least, most) = (order - BAND, order.max(exactness) + BAND);
+            let text = format!("{}D, {}: observed order {observed:.2}, {least} to {most}", last.dim, last.label());
+            found.push(((least..=most).contains(&observed), text));
         }
     }
     found.into_iter().for_each(|(holds, text)| bench.claim(SCENE, holds, text));
+}
+
+/// P of the kernel that a sample is remeshed by.
+fn exactness(sample: &Sample) -> Option<f64> {
+    sample.stepper.split_once("Lambda ")?.1.split(' ').next()?.parse().ok()
 }

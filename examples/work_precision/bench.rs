@@ -41,7 +41,7 @@ impl Bench {
         let runs = match (once, quick) {
             (true, _) => Runs { most: 1, seconds: 0.0, long: 0.0 },
             (_, true) => Runs { most: FEWEST, seconds: 0.0, long: 0.05 },
-            _ => Runs { most: 15, seconds: 0.4, long: 0.6 },
+            _ => Runs { most: 15, seconds: 0.2, long: 0.4 },
         };
         let (table, once) = (Table::default(), 0);
         Self { quick, runs, once, out, table, figures: Vec::new(), notes: Vec::new(), claims: Vec::new() }

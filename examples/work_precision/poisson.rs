@@ -3,7 +3,9 @@
 //! u is given on the sphere and on half of the circle, du/dn on the other half. Iterations have the incomplete factors
 //! ILU(0) of the rows, and end far below the error in space. Errors are relative, over all particles.
 //!
-//! In the ball order 8 is left out: its rows take 440 of a few thousand particles, and a minute.
+//! In the ball order 8 is left out: its rows take 440 of a few thousand particles, and a minute. Order 8 in the disc and 6 in
+//! the ball start a set later: on the coarsest, rows take a quarter and an eighth of all particles, and the errors fall from
+//! there as h^11.5 and h^11.8, which tells nothing of their orders.
 
 use std::error::Error;
 
@@ -21,7 +23,7 @@ const SCENE: &str = "poisson";
 const TOLERANCE: f64 = 1e-13;
 /// Neighbors of the rows of normal derivatives, in units of their conditions.
 const NEUMANN_RATIO: f64 = 3.0;
-/// How far the order over all refinements may be below r.
+/// How far the order over all refinements may be from r.
 const BAND: f64 = 0.3;
 /// How far the errors of two solvers may be apart, relative to them, and what the residual leaves of each.
 const SAME: f64 = 0.01;
@@ -29,6 +31,9 @@ const SOLVED: f64 = 1e-11;
 
 const PHASES: &str = "Build makes the rows and the matrix. Step is the solver: its factors, and its iterations with their products, \
     which are not timed apart.";
+const COARSE: &str = "Order 8 in the disc and 6 in the ball start a set later: on the coarsest, a row takes a quarter and an \
+    eighth of all particles, and errors fall faster from there than the order says. Order 8 in the ball, of 440 neighbors, is \
+    left out.";
 
 type Solver = (&'static str, fn(CsrMatrix) -> parops::Result<SparseSolver>);
 
@@ -40,15 +45,18 @@ const SOLVERS: &[Solver] = &[
 
 pub fn run(bench: &mut Bench) -> Result<(), Box<dyn Error>> {
     bench.note(SCENE, PHASES);
-    let across: &[usize] = if bench.quick { &[24, 36, 54] } else { &[24, 36, 54, 81] };
-    for order in [2, 4, 6, 8] {
-        refine(bench, "disc", order, across, disc)?;
+    bench.note(SCENE, COARSE);
+    let across = [24, 36, 54, 81];
+    for order in [2, 4, 6] {
+        let most = if bench.quick && order < 6 { 3 } else { 4 };
+        refine(bench, "disc", order, &across[..most], disc)?;
     }
-    let across: &[usize] = if bench.quick { &[12, 16] } else { &[12, 16, 20, 25] };
+    refine(bench, "disc", 8, &across[1..], disc)?;
+    let across = [12, 16, 20, 25];
     for order in [2, 4] {
-        refine(bench, "ball", order, across, ball)?;
+        refine(bench, "ball", order, &across[..if bench.quick { 2 } else { 4 }], ball)?;
     }
-    refine(bench, "ball", 6, &across[..across.len().min(3)], ball)?;
+    refine(bench, "ball", 6, &across[1..3], ball)?;
     claims(bench);
     Ok(())
 }
@@ -132,9 +140,10 @@ fn claims(bench: &mut Bench) {
         for series in &all {
             let (first, last) = (series[0], series[series.len() - 1]);
             let observed = observed_order([first.h, last.h], [first.error_l2, last.error_l2]).unwrap_or(0.0);
-            let least = f64::from(last.order) - BAND;
-            let shown = format!("{}, {}: observed order {observed:.2}, at least {least}", last.set, last.label());
-            found.push((observed >= least, shown));
+            let order = f64::from(last.order);
+            let shown =
+                format!("{}, {}: observed order {observed:.2}, within {BAND} of {order}", last.set, last.label());
+            found.push(((observed - order).abs() <= BAND, shown));
             let finest = all.iter().map(|other| other[other.len() - 1]).filter(|other| other.order == last.order);
             let apart = finest.map(|other| (other.error_l2 - last.error_l2).abs()).fold(0.0, f64::max);
             let allowed = SAME * last.error_l2 + SOLVED;
