@@ -125,7 +125,7 @@ impl SpectrumEstimator {
         Ok(Self { tolerance, ..self })
     }
 
-    /// Whether all eigenvalues of a map of n entries are found.
+    /// Whether all eigenvalues of a map of n entries are looked for; where QR does not find them the runs are made.
     pub fn is_exact(&self, n: usize) -> bool {
         n <= self.dense.min(self.most)
     }
@@ -147,14 +147,16 @@ impl SpectrumEstimator {
     ///
     /// # Errors
     /// Those of `apply`; [`LinearError::Value`] naming the first entry of a product that is not finite;
-    /// [`LinearError::NotConverged`] where the eigenvalues of a matrix are not found;
+    /// [`LinearError::NotConverged`] where the eigenvalues of the small matrix are not found;
     /// [`ParticleError::Memory`](crate::ParticleError::Memory) where m + 1 vectors do not fit.
     pub fn estimate(&self, n: usize, mut apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<Spectrum> {
         if n == 0 {
             return Ok(Spectrum::default());
         }
-        if self.is_exact(n) {
-            return all(n, apply);
+        if self.is_exact(n)
+            && let Some(spectrum) = all(n, &mut apply)?
+        {
+            return Ok(spectrum);
         }
         let outer = Search { subspace: self.subspace, tolerance: self.tolerance.max(1e-3), most: self.most };
         let largest = outer.run(n, &mut apply, |value| value.norm(), 0.0)?;
@@ -172,8 +174,9 @@ impl SpectrumEstimator {
     }
 }
 
-/// The spectrum from all eigenvalues of the matrix, whose columns are the products with unit vectors.
-fn all(n: usize, mut apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<Spectrum> {
+/// The spectrum from all eigenvalues of the matrix, whose columns are the products with unit vectors; `None` where they are
+/// not found.
+fn all(n: usize, apply: &mut impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<Option<Spectrum>> {
     let (mut matrix, mut unit) = (DMatrix::zeros(n, n), vec![0.0; n]);
     for (q, mut column) in matrix.column_iter_mut().enumerate() {
         unit[q] = 1.0;
@@ -184,12 +187,10 @@ fn all(n: usize, mut apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Res
         }
     }
     let residual = f64::EPSILON * matrix.norm();
-    let Some(values) = eigenvalues(&matrix) else {
-        return Err(LinearError::NotConverged { iterations: n, residual: f64::INFINITY, tolerance: residual }.into());
-    };
+    let Some(values) = eigenvalues(&matrix) else { return Ok(None) };
     let further = |a: Complex<f64>, b: &Complex<f64>| if b.re > a.re { *b } else { a };
     let rightmost = values.iter().fold(values[0], further);
     let radius = values.iter().fold(0.0, |radius: f64, value| radius.max(value.norm()));
     let (abscissa, frequency) = (rightmost.re, rightmost.im.abs());
-    Ok(Spectrum { abscissa, frequency, residual, radius, applies: n, converged: true, exact: true })
+    Ok(Some(Spectrum { abscissa, frequency, residual, radius, applies: n, converged: true, exact: true }))
 }
