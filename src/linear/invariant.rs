@@ -24,12 +24,7 @@ impl Ordered {
             let values = vec![C::new(0.0, 0.0); size];
             return (scale == 0.0).then(|| Self { values, vectors: DMatrix::identity(size, size) });
         }
-        // The package takes an entry for zero beside its diagonal entries, which never happens where these are zero
-        // themselves: the shift puts them between 1 and 3.
-        let mut shifted = h / scale;
-        (0..size).for_each(|i| shifted[(i, i)] += 2.0);
-        let (u, mut t) = (0..TURNS).find_map(|turn| schur(&shifted, turn))?;
-        (0..size).for_each(|i| t[(i, i)] -= 2.0);
+        let (u, t) = form(h, scale)?;
         let (mut u, mut t) = (u.map(|x| C::new(x, 0.0)), t.map(|x| C::new(x, 0.0)));
         // How many eigenvalues belong together at each place: 1, or 2 for conjugates.
         let mut units = Vec::new();
@@ -82,6 +77,39 @@ impl Ordered {
         order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
         Some(DMatrix::from_fn(size, k, |row, column| eigen.eigenvectors[(row, order[column])]))
     }
+}
+
+/// All eigenvalues of a real matrix. `None` where they are not found.
+pub(super) fn eigenvalues(a: &DMatrix<f64>) -> Option<Vec<C>> {
+    let (size, scale) = (a.nrows(), a.norm());
+    if scale == 0.0 {
+        return Some(vec![C::new(0.0, 0.0); size]);
+    }
+    let t = form(a, scale)?.1;
+    let mut values = Vec::with_capacity(size);
+    while values.len() < size {
+        let i = values.len();
+        if i + 1 < size && t[(i + 1, i)] != 0.0 {
+            let half = (t[(i, i)] - t[(i + 1, i + 1)]) / 2.0;
+            let root = C::new(half * half + t[(i, i + 1)] * t[(i + 1, i)], 0.0).sqrt();
+            let middle = t[(i + 1, i + 1)] + half;
+            values.extend([(root + middle) * scale, (-root + middle) * scale]);
+        } else {
+            values.push(C::new(t[(i, i)] * scale, 0.0));
+        }
+    }
+    Some(values)
+}
+
+/// U and T with A U = scale U T.
+fn form(a: &DMatrix<f64>, scale: f64) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+    // The package takes an entry for zero beside its diagonal entries, which never happens where these are zero
+    // themselves: the shift puts them between 1 and 3.
+    let mut shifted = a / scale;
+    (0..a.nrows()).for_each(|i| shifted[(i, i)] += 2.0);
+    let (u, mut t) = (0..TURNS).find_map(|turn| schur(&shifted, turn))?;
+    (0..a.nrows()).for_each(|i| t[(i, i)] -= 2.0);
+    Some((u, t))
 }
 
 /// How often a Schur form is looked for.

@@ -5,15 +5,19 @@ use super::moving::{Moving, MovingScene};
 use super::policy::GrowthPolicy;
 use super::scene::Scene;
 use super::semi_discrete::SemiDiscrete;
-use crate::error::{ErrorKind, LinearError, Result, SolverError};
+use crate::error::{ErrorKind, Limit, LinearError, Result, SolverError};
 use crate::linear::{Spectrum, SpectrumEstimator};
 
 /// The largest legal growth rate over the spectral radius, for `f64` rows; for `f32` what their rounding moves eigenvalues
 /// by, if that is more.
 const LIMIT: f64 = 1e-8;
 
-/// How far from the abscissa estimates end that do not converge, over the radius; see [`SpectrumEstimator`].
+/// How far right of the spectrum estimates amid the imaginary axis end that are not exact, over the radius; their residual
+/// where that is less.
 const RESOLUTION: f64 = 0.002;
+
+/// Vectors of the search where a term oscillates: amid the imaginary axis fewer miss growth.
+const VECTORS: usize = 64;
 
 /// Products after which the estimate is taken as it is.
 const MOST: usize = 1000;
@@ -41,7 +45,8 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
         let count = self.site().points().len();
         let (mut field, mut rate) = (vec![S::Value::ZERO; count], vec![S::Value::ZERO; count]);
         // Values beyond the range of f32 never come up: the vectors of the search have unit length.
-        SpectrumEstimator::new().most(MOST).estimate(free.len(), |u, du| {
+        let vectors = if self.oscillates(t)? { VECTORS } else { 32 };
+        SpectrumEstimator::new().subspace(vectors).most(MOST).estimate(free.len(), |u, du| {
             free.iter().zip(u).for_each(|(&p, &u)| field[p].set(0, u));
             self.linear(t, &mut field, &mut rate)?;
             free.iter().zip(du).for_each(|(&p, du)| *du = rate[p].get(0));
@@ -49,16 +54,29 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
         })
     }
 
-    /// The growth rate at time t as the policy wants it; NaN where nothing is to be estimated.
+    /// Whether an advection term puts eigenvalues along the imaginary axis.
+    fn oscillates(&mut self, t: f64) -> Result<bool> {
+        let rate = self.linear_limits(t)?.rate(Limit::Advection);
+        Ok(rate.oscillation > 0.0 || rate.modulus > 0.0)
+    }
+
+    /// The growth rate at time t as the policy wants it; NaN where nothing is to be estimated, and where neither growth is
+    /// found nor excluded.
     ///
     /// # Errors
     /// [`SolverError::Growing`] where it is refused, and as [`spectrum`](Self::spectrum).
     pub(super) fn growth(&mut self, t: f64, policy: GrowthPolicy) -> Result<f64> {
-        match policy {
-            GrowthPolicy::Refuse => Self::check_growth(&self.spectrum(t)?),
-            GrowthPolicy::Allow => Ok(self.spectrum(t)?.abscissa),
-            GrowthPolicy::Unknown => Ok(f64::NAN),
+        if policy == GrowthPolicy::Unknown {
+            return Ok(f64::NAN);
         }
+        let spectrum = self.spectrum(t)?;
+        let found = Self::check_growth(&spectrum);
+        if found.is_err() {
+            return if policy == GrowthPolicy::Allow { Ok(spectrum.abscissa) } else { found };
+        }
+        // Runs along the imaginary axis may converge to an eigenvalue that is not the rightmost.
+        let known = spectrum.exact || spectrum.converged && !self.oscillates(t)?;
+        if known { found } else { Ok(f64::NAN) }
     }
 
     /// Refuses a spectrum with modes that are known to grow, and returns their rate otherwise.
@@ -68,7 +86,7 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
     pub(super) fn check_growth(spectrum: &Spectrum) -> Result<f64> {
         let limit = legal::<S::Value>();
         // What the residual leaves open is no proof of growth, but estimates that did not converge are good to this too.
-        let open = spectrum.residual.min(RESOLUTION * spectrum.radius);
+        let open = if spectrum.exact { 0.0 } else { spectrum.residual.min(RESOLUTION * spectrum.radius) };
         if spectrum.abscissa - open > limit * spectrum.radius {
             let (rate, radius) = (spectrum.abscissa, spectrum.radius);
             return Err(SolverError::Growing { rate, radius, limit }.into());

@@ -86,7 +86,8 @@ fn tuned_hyperviscosity_bounds_what_grows_without_it() {
             rows.apply(u, du)?;
             damping.add(&velocities, u, du)
         }));
-        let growth = Promise::new("Limits of steps", "growth left by tuned hyperviscosity, of the whole spectrum");
+        let growth =
+            Promise::new("Limits of steps", "growth left by hyperviscosity tuned to 1e-3 v/h, of the whole spectrum");
         growth.in_units("v/h", 1.0 / h.0).at_most(1e-3, right);
 
         // Its share of the step limit.

@@ -187,8 +187,51 @@ fn single_precision_rows_agree_with_double() {
     assert!(out.iter().zip(&found).all(|(a, &b)| (a - f64::from(b)).abs() <= tolerance));
 }
 
+/// Rounding of the dense eigenvalues over the radius, up to 196 of a matrix that is not normal.
+const ROUNDING: f64 = 1e-11;
+
+/// On how many of 100 sets and 3 flows, one of them nearly along an axis, modes grow; and the largest rate over the radius
+/// that is none.
+fn growing(method: impl Fn(&Particles<2>) -> UpwindDcPse, jitter: f64) -> (usize, f64) {
+    let turn = std::f64::consts::TAU;
+    let (mut grown, mut rest) = (0, 0.0_f64);
+    for seed in 0..100 {
+        let set = jittered::<2>(9, jitter, seed);
+        let rows = assemble(method(&set), &set, &periodic());
+        let turning = set.points().iter().map(|x| [(turn * x[1]).sin(), (turn * x[0] + 1.0).sin()]).collect();
+        for velocities in [vec![[0.8, -0.6]; set.len()], vec![[1.0, 0.0]; set.len()], turning] {
+            let a = dense::matrix(set.len(), |u, du| rows.apply(&velocities, u, du)).scale(-1.0);
+            let (right, outer) = dense::extremes(&a);
+            if right / outer > 1e-6 {
+                grown += 1;
+            } else {
+                rest = rest.max(right / outer);
+            }
+        }
+    }
+    (grown, rest)
+}
+
 #[test]
-fn spectra_lie_left_of_the_axis_up_to_jitter_of_three_tenths() {
+fn upwind_rows_grow_on_few_jittered_sets_and_on_none_of_a_tenth() {
+    let half = |_: &Particles<2>| UpwindDcPse::half_stencils();
+    let biased = |set: &Particles<2>| UpwindDcPse::biased(set.spacing().unwrap());
+    let reason = "upwind DC-PSE has no proof of stability: some sets hold a particle whose side is thin";
+    for (name, (calm, rest), (grown, _)) in [
+        ("half-stencils", growing(half, 0.1), growing(half, 0.3)),
+        ("biased", growing(biased, 0.1), growing(biased, 0.3)),
+    ] {
+        let promise = |text| Promise::new("Limits of steps", format!("{text}, upwind DC-PSE, {name}, 2D"));
+        promise("growth over the radius, jitter 0.1 h, 300 cases").at_most(ROUNDING, rest);
+        assert_eq!(calm, 0, "{name}");
+        // Measured at sides of 9 and 14, 400 cases each: 10 and 16 by half-stencils, 1 and 7 by biased ones.
+        let share = promise("share of 300 cases that grow, jitter 0.3 h").short_of(0.0, reason);
+        share.at_most(0.05, grown as f64 / 300.0);
+    }
+}
+
+#[test]
+fn row_sums_bound_spectra_and_rk4_bears_those_left_of_the_axis() {
     let side = 14;
     for jitter in [0.0, 0.1, 0.2, 0.3] {
         let set = jittered::<2>(side, jitter, 9);
@@ -208,10 +251,8 @@ fn spectra_lie_left_of_the_axis_up_to_jitter_of_three_tenths() {
                 let right = values.iter().fold(f64::NEG_INFINITY, |right, z| right.max(z.re));
                 let outer = values.iter().fold(0.0_f64, |outer, z| outer.max(z.norm()));
                 let bound = rows.rate_bound(velocities).unwrap();
-                // Rounding of the dense eigenvalues, 196 of a matrix that is not normal.
-                let growth =
-                    Promise::new("Limits of steps", "growth of upwind rows over their radius, jitter to 0.3 h");
-                growth.at_most(1e-11, right / outer);
+                // This set is one of the many that do not grow.
+                assert!(right / outer <= ROUNDING, "{right} {outer}");
                 let row = |(p, v): (usize, &[f64; 2])| -> f64 {
                     let part = |axis: usize| {
                         let side = &sides[axis][usize::from(v[axis] < 0.0)];
