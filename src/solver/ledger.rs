@@ -122,7 +122,7 @@ pub struct LedgerRow<const D: usize> {
     /// Substeps beyond the first, summed over the run.
     pub retries: u64,
     /// The largest growth rate of a mode, in 1/time, estimated when the rows were made, on moving particles when their
-    /// neighbors were searched last; NaN where nothing was estimated.
+    /// neighbors were searched last; NaN where nothing was estimated or an estimate settled nothing.
     pub growth: f64,
     /// Worst condition number of a moment system in use.
     pub condition: f64,
