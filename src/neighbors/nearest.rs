@@ -3,7 +3,7 @@
 use super::placed::distance_squared;
 use super::{CellList, Neighbors};
 use crate::domain::{Domain, LENGTH_HIGH, LENGTH_LOW};
-use crate::error::{DomainError, ErrorKind, Result};
+use crate::error::{DomainError, ErrorKind, NeighborError, Result};
 use crate::particles::{Particles, reserved};
 use crate::scale::Cutoff;
 use crate::stencil::{Neighbor, Stencil};
@@ -41,6 +41,9 @@ const GROWTH: f64 = 1.3;
 const SHELL: f64 = 1.0 + 1e-9;
 /// From the largest cutoff to the reach: three steps of 1.15, and their rounding.
 const ROOM: f64 = 1.15 * 1.15 * 1.15 * SHELL;
+/// A query looks as much farther as the coordinates may be rounded by, 72 eps of the largest: no farther than the reach of
+/// 2^53 cells over this.
+const ROUNDINGS: f64 = 128.0;
 /// Targets looked at before the first level is chosen.
 const SAMPLE: usize = 64;
 
@@ -72,10 +75,23 @@ impl<const D: usize> Nearest<D> {
         let k = k.max(1);
         let mut search = Search { k, row: Stencil::default(), distances: Vec::new() };
         let widest = widest(particles, domain, targets);
+        // Cells of this reach, or far fewer where an axis would have more of them than there may be: beside an outlier gaps
+        // may be finer than that, and than what its roundings leave of a query.
+        let cells = |mut reach: f64| loop {
+            let error = match cells(Cutoff(reach)) {
+                Err(error) if reach < widest => error,
+                made => return made,
+            };
+            let ErrorKind::Neighbor(NeighborError::Cells { cells, limit, .. }) = *error.kind() else {
+                return Err(error);
+            };
+            reach = (ROUNDINGS * cells / limit * reach).min(widest);
+        };
         // A ball of k lattice points; a set without a spacing is one place.
         let guess = particles.spacing().map_or(widest, |h| 0.6 * h.0 * (k as f64).powf(1.0 / D as f64));
         let mut reach = guess.min(widest).max(LENGTH_LOW);
-        let first = cells(Cutoff(reach))?;
+        let first = cells(reach)?;
+        reach = first.reach();
         let sample = (0..targets.len()).step_by(targets.len() / SAMPLE + 1);
         let nearest = sample.filter_map(|p| search.distance(&first, p)).filter(|&d| d > 0.0).fold(reach, f64::min);
         let mut made = Some(first).filter(|_| 2.0 * nearest > reach);
@@ -91,8 +107,9 @@ impl<const D: usize> Nearest<D> {
         loop {
             let level = match made.take() {
                 Some(level) => level,
-                None => cells(Cutoff(reach))?,
+                None => cells(reach)?,
             };
+            reach = level.reach();
             let last = reach >= widest;
             let before = open.len();
             open.retain(|&p| {
@@ -119,7 +136,7 @@ impl<const D: usize> Nearest<D> {
         let largest = cutoffs.iter().fold(0.0_f64, |largest, &cutoff| largest.max(cutoff));
         let room = admitted(domain, largest * ROOM);
         if levels.last().is_none_or(|last| last.reach() < room) {
-            levels.push(cells(Cutoff(room))?);
+            levels.push(cells(room)?);
         }
         Ok(Self { levels, cutoffs })
     }

@@ -80,6 +80,20 @@ fn sets_with_fewer_neighbors_than_asked_for_are_served_with_all_there_are() {
     assert_eq!((nearest.cutoff(7), nearest.reach()), (0.5, 0.5));
 }
 
+#[test]
+fn gaps_far_finer_than_the_cells_an_outlier_allows_are_served() {
+    // A gap of 1e-9 beside an outlier at 1e12: 10^22 cells, 2^53 may be.
+    let points = vec![[0.0, 0.0], [1e-9, 0.0], [0.5, 0.25], [0.75, -0.5], [1e12, 3e11]];
+    let particles = Particles::new(points).unwrap();
+    for (k, first) in [(1, 1e-9), (2, 0.3125_f64.sqrt())] {
+        let nearest = Nearest::build(&particles, &Domain::open(), k).unwrap();
+        assert!((0..5).all(|p| nearest.count(p, nearest.cutoff(p)) == k));
+        assert!((nearest.cutoff(0) / first - 1.0).abs() < 1e-8, "{}", nearest.cutoff(0));
+        let oracle = BruteForce::build(&particles, &Domain::open(), Cutoff(nearest.reach())).unwrap();
+        assert_eq!(check_provider_against(&nearest, &oracle), Ok(()));
+    }
+}
+
 proptest! {
     #![proptest_config(properties(cases()))]
 
