@@ -2,7 +2,6 @@
 
 use std::collections::{HashMap, HashSet};
 use std::error::Error;
-use std::fmt::Write;
 
 use parops::report::{Sample, Table};
 
@@ -66,21 +65,24 @@ pub fn faults(table: &Table, quick: bool) -> Vec<String> {
     faults
 }
 
-/// Replaces the stored errors of the scenes of this table and mode, in the source of this example.
+/// Stores the errors of this table and mode in the source of this example: lines of its scenes keep their places.
 pub fn record(table: &Table, quick: bool) -> Result<(), Box<dyn Error>> {
     let mode = if quick { "quick" } else { "full" };
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/work_precision/bounds.csv");
+    let line = |key: &str, [mean, largest]: Errors| format!("{key},{mean:.2e},{largest:.2e}");
+    let now = errors(table, mode);
+    let mut left: HashMap<&str, Errors> = now.iter().map(|(key, errors)| (key.as_str(), *errors)).collect();
     // What another run has stored since this was built stays.
     let before = std::fs::read_to_string(path)?;
     let replaced: HashSet<&str> = stored(&before, table, mode).map(|(key, _)| key).collect();
-    let mut text = format!("{HEADER}\n");
-    for line in before.lines().skip(1) {
-        if split(line).is_none_or(|(key, _)| !replaced.contains(key)) {
-            writeln!(text, "{line}")?;
+    let mut lines = vec![HEADER.to_string()];
+    for old in before.lines().skip(1) {
+        match split(old) {
+            Some((key, _)) if replaced.contains(key) => lines.extend(left.remove(key).map(|errors| line(key, errors))),
+            _ => lines.push(old.to_string()),
         }
     }
-    for (key, [mean, largest]) in errors(table, mode) {
-        writeln!(text, "{key},{mean:.2e},{largest:.2e}")?;
-    }
-    Ok(std::fs::write(path, text)?)
+    let new = now.iter().filter(|(key, _)| left.contains_key(key.as_str()));
+    lines.extend(new.map(|(key, errors)| line(key, *errors)));
+    Ok(std::fs::write(path, lines.join("\n") + "\n")?)
 }
