@@ -156,11 +156,13 @@ kinds! {
         } => "the velocity depends on time: nothing is at rest at t = {t}",
         /// A source that is not affine in u, where a steady problem needs one.
         NotAffine {
-            /// The source at u = 2.
+            /// The field, the first of several.
+            u: f64,
+            /// The source there.
             found: f64,
             /// What an affine source would have there.
             expected: f64,
-        } => "the source at u = 2 is {found}, where one affine in u would be {expected}",
+        } => "the source at u = {u} is {found}, where one affine in u would be {expected}",
         /// A steady problem to whose solution any constant may be added.
         OpenLevel {
             /// Number of particles.

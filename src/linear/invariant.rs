@@ -2,6 +2,7 @@
 
 use nalgebra::{Complex, DMatrix, DVector, Schur, SymmetricEigen};
 
+use super::norm::norm;
 use crate::particles::Random;
 
 type C = Complex<f64>;
@@ -19,7 +20,7 @@ impl Ordered {
     /// eigenvalues are not found.
     pub(super) fn new(h: &DMatrix<f64>, key: impl Fn(C) -> f64) -> Option<Self> {
         let size = h.nrows();
-        let scale = h.norm();
+        let scale = norm(h.as_slice());
         if !(scale > 0.0 && scale.is_finite()) {
             let values = vec![C::new(0.0, 0.0); size];
             return (scale == 0.0).then(|| Self { values, vectors: DMatrix::identity(size, size) });
@@ -81,9 +82,9 @@ impl Ordered {
 
 /// All eigenvalues of a real matrix. `None` where they are not found.
 pub(super) fn eigenvalues(a: &DMatrix<f64>) -> Option<Vec<C>> {
-    let (size, scale) = (a.nrows(), a.norm());
-    if scale == 0.0 {
-        return Some(vec![C::new(0.0, 0.0); size]);
+    let (size, scale) = (a.nrows(), norm(a.as_slice()));
+    if !(scale > 0.0 && scale.is_finite()) {
+        return (scale == 0.0).then(|| vec![C::new(0.0, 0.0); size]);
     }
     let t = form(a, scale)?.1;
     let mut values = Vec::with_capacity(size);

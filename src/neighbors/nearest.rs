@@ -37,6 +37,8 @@ pub struct Nearest<const D: usize> {
 
 /// From one level to the next.
 const GROWTH: f64 = 1.3;
+/// Across gaps.
+const FASTEST: f64 = 16.0;
 /// A neighbor as far away as the last one but for rounding is in.
 const SHELL: f64 = 1.0 + 1e-9;
 /// From the largest cutoff to the reach: three steps of 1.15, and their rounding.
@@ -44,7 +46,7 @@ const ROOM: f64 = 1.15 * 1.15 * 1.15 * SHELL;
 /// A query looks as much farther as the coordinates may be rounded by, 72 eps of the largest: no farther than the reach of
 /// 2^53 cells over this.
 const ROUNDINGS: f64 = 128.0;
-/// Targets looked at before the first level is chosen.
+/// Targets looked at before a level is chosen.
 const SAMPLE: usize = 64;
 
 impl<const D: usize> Nearest<D> {
@@ -90,25 +92,23 @@ impl<const D: usize> Nearest<D> {
         // A ball of k lattice points; a set without a spacing is one place.
         let guess = particles.spacing().map_or(widest, |h| 0.6 * h.0 * (k as f64).powf(1.0 / D as f64));
         let mut reach = guess.min(widest).max(LENGTH_LOW);
-        let first = cells(reach)?;
-        reach = first.reach();
-        let sample = (0..targets.len()).step_by(targets.len() / SAMPLE + 1);
-        let nearest = sample.filter_map(|p| search.distance(&first, p)).filter(|&d| d > 0.0).fold(reach, f64::min);
-        let mut made = Some(first).filter(|_| 2.0 * nearest > reach);
-        if made.is_none() {
-            reach = nearest.max(LENGTH_LOW);
-        }
 
         let (mut levels, mut cutoffs) = (Vec::new(), reserved(targets.len())?);
         cutoffs.resize(targets.len(), 0.0);
         let mut open: Vec<usize> = reserved(targets.len())?;
         open.extend(0..targets.len());
-        let mut growth = GROWTH;
-        loop {
-            let level = match made.take() {
-                Some(level) => level,
-                None => cells(reach)?,
-            };
+        let (mut growth, mut guessed) = (GROWTH, true);
+        while !open.is_empty() || levels.is_empty() {
+            let mut level = cells(reach)?;
+            if guessed {
+                // All that is open, searched in cells far too large, would be pairs of everybody.
+                let sample = open.iter().step_by(open.len() / SAMPLE + 1);
+                let nearest = sample.filter_map(|&p| search.distance(&level, p)).filter(|&d| d > 0.0);
+                let nearest = nearest.fold(level.reach(), f64::min).max(LENGTH_LOW);
+                if 2.0 * nearest <= level.reach() {
+                    level = cells(nearest)?;
+                }
+            }
             reach = level.reach();
             let last = reach >= widest;
             let before = open.len();
@@ -123,13 +123,10 @@ impl<const D: usize> Nearest<D> {
                 cutoffs[p] > reach
             });
             // A level that serves nobody is not kept, and the gap after it is crossed faster and faster.
-            let serves = open.len() < before || last || targets.is_empty();
-            growth = if serves { GROWTH } else { growth * growth };
-            if serves {
+            guessed = open.len() == before && !last && !targets.is_empty();
+            growth = if guessed { (growth * growth).min(FASTEST) } else { GROWTH };
+            if !guessed {
                 levels.push(level);
-            }
-            if open.is_empty() {
-                break;
             }
             reach = (reach * growth).min(widest);
         }

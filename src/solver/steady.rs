@@ -26,7 +26,7 @@ pub struct SteadyState<E> {
 ///
 /// By [`SparseSolver`]: sparse LU with the feature `faer`, otherwise GMRES. S and the boundary values are those of t = 0. A
 /// source of one field may be affine in u, S = a + b u, and b goes into the matrix; one of several fields may not depend
-/// on u. Without a boundary, or with fluxes alone, nothing fixes the level of u unless the source decays.
+/// on u. That S is so is checked where it is probed, and again at the field found. Without a boundary, or with fluxes alone, nothing fixes the level of u unless the source decays.
 ///
 /// ```
 /// use parops::{AdvectionDiffusion, Boundary, BoundaryCondition, DcPse, Domain, Gradient, Laplacian, Nearest, Particles};
@@ -59,8 +59,8 @@ pub fn steady<const D: usize, S: Scene<D>, P: Neighbors<D>>(
     }
     let count = particles.len();
     let zero = vec![S::Value::ZERO; count];
-    let slopes = slopes(&discrete, &zero)?;
-    let matrix = discrete.matrix_with(0.0, 0.0, |p| slopes.get(p).copied().unwrap_or(0.0))?;
+    let source = Affine::probe(&discrete, count)?;
+    let matrix = discrete.matrix_with(0.0, 0.0, |p| source.slopes.get(p).copied().unwrap_or(0.0))?;
     if count > 0 && annihilates_constants(&matrix) {
         return Err(SolverError::OpenLevel { particles: count }.into());
     }
@@ -81,6 +81,7 @@ pub fn steady<const D: usize, S: Scene<D>, P: Neighbors<D>>(
         report.residual = report.residual.max(solved.residual);
         u.iter_mut().zip(&x).for_each(|(u, x)| u.set(i, *x));
     }
+    source.confirm(&discrete, &u)?;
     Ok(SteadyState { u, report, condition: solver.condition()? })
 }
 
@@ -92,33 +93,74 @@ fn annihilates_constants(matrix: &CsrMatrix) -> bool {
     })
 }
 
-/// dS/du of a source that is affine in u, particle by particle.
-fn slopes<const D: usize, S: Scene<D>>(discrete: &SemiDiscrete<D, S>, zero: &[S::Value]) -> Result<Vec<f64>> {
-    let filled = |value: f64| {
-        let mut u = S::Value::ZERO;
-        (0..S::Value::FIELDS).for_each(|i| u.set(i, value));
-        vec![u; zero.len()]
-    };
-    let (one, two) = (filled(1.0), filled(2.0));
-    let mut slopes = vec![0.0; zero.len()];
-    for (p, _) in discrete.site().free() {
-        let [a, b, c] = [zero, &one[..], &two[..]].map(|u| discrete.source(p, 0.0, u));
-        for field in 0..S::Value::FIELDS {
-            let (a, b, found) = (a.get(field), b.get(field), c.get(field));
-            if ![a, b, found].iter().all(|s| s.is_finite()) {
+/// A source that is affine in u, S = S(0) + dS/du u, particle by particle.
+struct Affine<E> {
+    /// S(0), of every particle.
+    offsets: Vec<E>,
+    /// dS/du; zero where no source acts, and of several fields.
+    slopes: Vec<f64>,
+}
+
+/// Powers of two between the fields a source is probed with.
+const STRIDE: usize = 60;
+
+impl<E: Fields> Affine<E> {
+    /// Probes the source with u = 0, 1 and 2, and with as much larger fields as it takes for S to change by half of itself: a
+    /// slope is known to rounding then, whatever the units of u. Of several fields none may depend on any, at any scale: one
+    /// matrix serves them all.
+    fn probe<const D: usize, S: Scene<D, Value = E>>(discrete: &SemiDiscrete<D, S>, count: usize) -> Result<Self> {
+        let (mut offsets, mut slopes) = (vec![E::ZERO; count], vec![0.0; count]);
+        let mut u = vec![E::ZERO; count];
+        for (p, _) in discrete.site().free() {
+            let mut at = |value: f64| {
+                (0..E::FIELDS).for_each(|i| u[p].set(i, value));
+                let (filled, source) = (u[p], discrete.source(p, 0.0, &u));
+                u[p] = E::ZERO;
+                (filled, source)
+            };
+            let offset = at(0.0).1;
+            if let Some(field) = (0..E::FIELDS).find(|&field| !offset.get(field).is_finite()) {
                 return Err(Error::from(SolverError::Source { field, t: 0.0 }).at(p));
             }
-            // Of several fields none may depend on any: one matrix serves them all.
-            let slope = if S::Value::FIELDS == 1 { b - a } else { 0.0 };
-            let (expected, size) = (a + 2.0 * slope, a.abs() + 2.0 * b.abs() + found.abs());
-            let rounding = ROUNDING * S::Value::EPSILON * size;
-            if !((found - expected).abs() <= rounding && (b - a - slope).abs() <= rounding) {
-                return Err(Error::from(SolverError::NotAffine { found, expected }).at(p));
+            for power in (0..f64::MAX_EXP).step_by(STRIDE) {
+                let unit = 2.0_f64.powi(power);
+                let ((_, once), (filled, twice)) = (at(unit), at(2.0 * unit));
+                if !filled.finite() {
+                    break;
+                }
+                let change = once.get(0) - offset.get(0);
+                slopes[p] = if E::FIELDS == 1 { change / unit } else { 0.0 };
+                check(offset, slopes[p], unit, once).map_err(|error| error.at(p))?;
+                check(offset, slopes[p], 2.0 * unit, twice).map_err(|error| error.at(p))?;
+                if E::FIELDS == 1 && change.abs() >= 0.5 * offset.get(0).abs() {
+                    break;
+                }
             }
-            slopes[p] = slope;
+            offsets[p] = offset;
+        }
+        Ok(Self { offsets, slopes })
+    }
+
+    /// Whether the source is what was taken for it at the field found: it may be affine where it was probed and not here.
+    fn confirm<const D: usize, S: Scene<D, Value = E>>(&self, discrete: &SemiDiscrete<D, S>, u: &[E]) -> Result<()> {
+        discrete.site().free().try_for_each(|(p, _)| {
+            let found = discrete.source(p, 0.0, u);
+            check(self.offsets[p], self.slopes[p], u[p].get(0), found).map_err(|error| error.at(p))
+        })
+    }
+}
+
+/// Refuses a source that is not offset + slope u, but for rounding.
+fn check<E: Fields>(offset: E, slope: f64, u: f64, found: E) -> Result<()> {
+    let more = slope * u;
+    for field in 0..E::FIELDS {
+        let (offset, found) = (offset.get(field), found.get(field));
+        let (expected, size) = (offset + more, offset.abs() + more.abs() + found.abs());
+        if !((found - expected).abs() <= ROUNDING * E::EPSILON * size) {
+            return Err(SolverError::NotAffine { u, found, expected }.into());
         }
     }
-    Ok(slopes)
+    Ok(())
 }
 
 /// Roundings of a source and of the comparison, in eps of its values.

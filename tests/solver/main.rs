@@ -21,4 +21,5 @@ mod resume;
 mod scene;
 mod sharp_limits;
 mod steady;
+mod steady_sources;
 mod watch;

@@ -114,7 +114,7 @@ fn what_has_no_steady_state_is_refused() -> Result<()> {
 
     let squared = steady(scene().source(|_, _, u| 1.0 - u * u).boundary(ends(), |_, _, _| 0.0), &rod, &neighbors);
     let error = squared.unwrap_err();
-    assert_eq!(*error.kind(), ErrorKind::Solver(SolverError::NotAffine { found: -3.0, expected: -1.0 }));
+    assert_eq!(*error.kind(), ErrorKind::Solver(SolverError::NotAffine { u: 2.0, found: -3.0, expected: -1.0 }));
     assert_eq!(error.particle(), Some(1));
 
     let gust = scene().advection(|_: &[f64; 1], t: f64| [t], DcPse::<Gradient<1>, 2>::new());
