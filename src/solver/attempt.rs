@@ -5,6 +5,7 @@ use super::lagrangian::Lagrangian;
 use super::limits::Limits;
 use super::moving::{Held, MovingScene, MovingState};
 use super::remeshing::{Trigger, overlap_is_lost};
+use super::source::slack;
 use super::substeps::Substeps;
 use crate::error::{Error, ErrorKind, Limit, Result, SolverError};
 use crate::mesh::{Dropped, Remeshed};
@@ -48,7 +49,7 @@ impl<'a, const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>
         loop {
             let (limit, binding) = (limits.step(&self.run.stepper), limits.binding(&self.run.stepper));
             let t = left.t;
-            let part = left.next(limit, binding)?;
+            let part = left.next(limit * slack::<D, S::Value, S::Source>(), binding)?;
             self.substep(t, part)?;
             if left.done() {
                 self.turn(end)?;

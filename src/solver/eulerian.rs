@@ -9,7 +9,8 @@ use super::saved::SavedRun;
 use super::scene::Scene;
 use super::scheme::TimeScheme;
 use super::semi_discrete::SemiDiscrete;
-use super::substeps::Substeps;
+use super::source::slack;
+use super::substeps::{Substeps, longest};
 use super::watch::{check_budget, check_drift};
 use crate::error::{Limit, Result, TimeError};
 use crate::neighbors::Neighbors;
@@ -131,13 +132,16 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         self.t
     }
 
-    /// The longest legal step from here: infinite without a limit.
+    /// The longest legal step from here: infinite without a limit. Where flow or source depend on time, one that is legal at
+    /// both its ends, and no longer than the limit at its start.
     ///
     /// # Errors
     /// As [`limits`](Self::limits).
     pub fn longest_step(&mut self, u: &[S::Value]) -> Result<f64> {
-        let limits = self.limits(u)?;
-        Ok(self.bound(&limits).0)
+        longest(|dt| {
+            let limits = self.limits_of(self.t, dt, u)?;
+            Ok(self.bound(&limits).0)
+        })
     }
 
     /// The ledger after the last step.
@@ -189,7 +193,7 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         self.limits_of(self.t, 0.0, u)
     }
 
-    /// What bounds a step from t over dt: the larger rates of its ends, of a source that at t.
+    /// What bounds a step from t over dt: the larger rates of its ends.
     fn limits_of(&mut self, t: f64, dt: f64, u: &[S::Value]) -> Result<Limits> {
         let (found, needed) = (u.len(), self.discrete.site().points().len());
         if found != needed {
@@ -198,6 +202,10 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         let mut limits = self.discrete.limits(t, u)?;
         if dt > 0.0 && !self.discrete.steady() {
             limits = limits.larger(&self.discrete.linear_limits(t + dt)?);
+        }
+        if dt > 0.0 {
+            // Where a source is not finite at the end the stepper finds it so, if it comes there.
+            limits = limits.larger(&self.discrete.source_limits(t + dt, u).unwrap_or_default());
         }
         self.sharp.iter().for_each(|&(limit, rate)| limits.set(limit, rate));
         Ok(limits)
@@ -248,7 +256,7 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         }
         let limits = self.limits_of(self.t, dt, u)?;
         let (limit, binding) = self.bound(&limits);
-        let within = dt <= limit;
+        let within = dt <= limit * slack::<D, S::Value, S::Source>();
         if !within && self.steps == StepPolicy::Refuse {
             return Err(limits.refuse(dt, limit, binding));
         }
@@ -332,7 +340,7 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         loop {
             let (limit, binding) = self.bound(&limits);
             let t = left.t;
-            let part = left.next(limit, binding)?;
+            let part = left.next(limit * slack::<D, S::Value, S::Source>(), binding)?;
             self.substep(u, t, part)?;
             if left.done() {
                 return Ok(left.taken);

@@ -8,6 +8,7 @@ use super::moving::{Moving, MovingScene, MovingState};
 use super::moving_diffusion::{MovingDiffusion, MovingSettings};
 use super::policy::{GrowthPolicy, StepPolicy};
 use super::remeshing::{Nodes, Remesher, Remeshing, check};
+use super::substeps::longest;
 use super::watch::OverlapWatch;
 use crate::domain::Domain;
 use crate::error::{Limit, Result, SolverError};
@@ -242,12 +243,13 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
         Ok(self.limits_of(self.t, 0.0, None)?.0)
     }
 
-    /// The longest legal step from here: infinite without a limit.
+    /// The longest legal step from here: infinite without a limit. Where flow or source depend on time, one that is legal at
+    /// both its ends, and no longer than the limit at its start.
     ///
     /// # Errors
     /// As [`limits`](Self::limits).
     pub fn longest_step(&mut self) -> Result<f64> {
-        Ok(self.limits()?.step(&self.stepper))
+        longest(|dt| Ok(self.limits_of(self.t, dt, None)?.0.step(&self.stepper)))
     }
 
     /// Advances the run by one step, and replaces the particles where it is time.

@@ -6,6 +6,7 @@ use super::ledger::LedgerRow;
 use super::limits::Limits;
 use super::moving::{MovingScene, MovingState};
 use super::policy::StepPolicy;
+use super::source::slack;
 use crate::apply::Report;
 use crate::error::{Result, TimeError};
 use crate::time::Stepper;
@@ -17,7 +18,7 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
         }
         let (limits, report) = self.limits_of(self.t, dt, None)?;
         let (limit, binding) = (limits.step(&self.stepper), limits.binding(&self.stepper));
-        let within = dt <= limit;
+        let within = dt <= limit * slack::<D, S::Value, S::Source>();
         if !within && self.policy == StepPolicy::Refuse {
             return Err(limits.refuse(dt, limit, binding));
         }

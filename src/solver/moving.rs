@@ -277,7 +277,16 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
             limits.set(Limit::Compression, Rate::default());
         }
         if <S::Source as SceneTerm<D, S::Value>>::PRESENT {
-            self.scene.source_term().limit(&mut (), &self.held.site, t, &self.u, &mut limits)?;
+            let of = |t: f64| {
+                let mut limits = Limits::default();
+                let limit = self.scene.source_term().limit(&mut (), &self.held.site, t, &self.u, &mut limits);
+                limit.map(|()| limits)
+            };
+            limits = limits.larger(&of(t)?);
+            if dt > 0.0 {
+                // Where it is not finite at the end the stepper finds it so, if it comes there.
+                limits = limits.larger(&of(t + dt).unwrap_or_default());
+            }
         }
         Ok((limits, checked.map(|(report, _)| report)))
     }

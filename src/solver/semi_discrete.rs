@@ -269,11 +269,17 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
     /// # Errors
     /// As [`SceneTerm::limit`].
     pub fn limits(&mut self, t: f64, u: &[S::Value]) -> Result<Limits> {
-        let Self { scene, site, diffusion, advection, source, .. } = self;
+        let Self { scene, site, diffusion, advection, .. } = self;
         let mut limits = Limits::default();
         scene.diffusion_term().limit(diffusion, site, t, u, &mut limits)?;
         scene.advection_term().limit(advection, site, t, u, &mut limits)?;
-        scene.source_term().limit(source, site, t, u, &mut limits)?;
+        Ok(limits.larger(&self.source_limits(t, u)?))
+    }
+
+    /// What the source alone bounds.
+    pub(super) fn source_limits(&mut self, t: f64, u: &[S::Value]) -> Result<Limits> {
+        let mut limits = Limits::default();
+        self.scene.source_term().limit(&mut self.source, &self.site, t, u, &mut limits)?;
         Ok(limits)
     }
 

@@ -3,6 +3,24 @@
 use super::policy::StepPolicy;
 use crate::error::{Limit, Result, SolverError};
 
+/// The longest step that is legal, from the limit of a step of a given length, its ends looked at: of decreasing ones the
+/// first that its own limit admits.
+pub(super) fn longest(mut limit: impl FnMut(f64) -> Result<f64>) -> Result<f64> {
+    let mut dt = limit(0.0)?;
+    for turn in 0.. {
+        let found = if dt > 0.0 && dt.is_finite() { limit(dt)? } else { dt };
+        if !(found < dt) {
+            break;
+        }
+        // Limits change with time, but not at once: a step short enough is legal.
+        dt = if turn < TURNS { found } else { 0.5 * dt };
+    }
+    Ok(dt)
+}
+
+/// Steps that are tried before they are halved.
+const TURNS: usize = 8;
+
 /// What is left of a step.
 pub(super) struct Substeps {
     /// The time reached.

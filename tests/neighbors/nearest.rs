@@ -94,6 +94,22 @@ fn gaps_far_finer_than_the_cells_an_outlier_allows_are_served() {
     }
 }
 
+#[test]
+fn dense_cluster_in_an_even_set_is_searched_in_cells_of_its_own() {
+    // Spacings 10^6 apart: cells that reach as far as thin places need hold the whole cluster.
+    for size in [1e-2, 1e-6, 1e-12] {
+        let mut random = Random::new(5);
+        let mut point = |size: f64| [size * random.uniform(), size * random.uniform()];
+        let points = (0..4000).map(|i| if i < 2000 { point(1.0) } else { point(size) }).collect();
+        let particles = Particles::new(points).unwrap();
+        let nearest = Nearest::build(&particles, &Domain::open(), 18).unwrap();
+        let largest = (0..4000).map(|p| nearest.cutoff(p)).fold(0.0, f64::max);
+        assert!(nearest.reach() <= 2.5 * largest, "{} for {largest}", nearest.reach());
+        let cluster = (2000..4000).filter(|&p| nearest.count(p, nearest.cutoff(p)) == 18);
+        assert_eq!(cluster.count(), 2000);
+    }
+}
+
 proptest! {
     #![proptest_config(properties(cases()))]
 

@@ -14,6 +14,7 @@ mod hyperviscosity;
 mod jump;
 mod lagrangian;
 mod lagrangian_growth;
+mod longest_step;
 mod relations;
 mod remeshed;
 mod remeshed_substeps;
