@@ -26,8 +26,12 @@ impl MomentSolver for Lu {
         let (n, l) = (system.neighbors(), system.conditions());
         let MomentScratch { matrix, b, y, .. } = scratch;
         moment_matrix(system, matrix);
+        let singular = || OperatorError::Singular { neighbors: n, conditions: l, rank: 0 };
+        // Columns of zeros, of what is no number, or of no neighbor at all.
+        if !(0..l).all(|j| matrix[j * l + j] > T::zero()) {
+            return Err(singular().into());
+        }
         let a = DMatrix::from_fn(l, l, |i, j| matrix[i.max(j) * l + i.min(j)]);
-        let singular = |rank| OperatorError::Singular { neighbors: n, conditions: l, rank };
         let values = DMatrix::from_column_slice(n, l, system.columns()).singular_values();
         let condition = values.max() / values.min();
         let lu = a.lu();
@@ -37,7 +41,7 @@ impl MomentSolver for Lu {
             b.extend(system.scaled_required(k));
             let mut solved = nalgebra::DVector::from_column_slice(b);
             if !lu.solve_mut(&mut solved) {
-                return Err(singular(0).into());
+                return Err(singular().into());
             }
             y.clear();
             y.resize(n, T::zero());

@@ -98,12 +98,17 @@ impl<const D: usize> VerletList<D> {
     /// naming one that has left the domain, and as [`build`](Self::build) where the rows are searched anew. The list
     /// is then as it was.
     pub fn update(&mut self, particles: &Particles<D>) -> Result<bool> {
+        Ok(self.replaced(particles)?.is_some())
+    }
+
+    /// The same; returns the list there was where the rows were searched anew.
+    pub(crate) fn replaced(&mut self, particles: &Particles<D>) -> Result<Option<Self>> {
         let (found, needed) = (particles.len(), self.placed.sources.len());
         if found != needed {
             return Err(ParticleError::Length { found, needed }.into());
         }
         if particles.generation() == self.placed.generation {
-            return Ok(false);
+            return Ok(None);
         }
         let domain = self.placed.domain;
         self.spare.clear();
@@ -116,13 +121,13 @@ impl<const D: usize> VerletList<D> {
         if !(2.0 * farthest.sqrt() <= self.skin) {
             let placed = Placed::new(None, particles, &domain, Cutoff(self.placed.cutoff))?;
             let searched = Self::search(placed, particles, self.skin)?;
-            *self = Self { rebuilds: self.rebuilds + 1, ..searched };
-            return Ok(true);
+            let searched = Self { rebuilds: self.rebuilds + 1, ..searched };
+            return Ok(Some(std::mem::replace(self, searched)));
         }
         std::mem::swap(&mut self.spare, &mut self.placed.sources);
         self.placed.generation = particles.generation();
         self.cross();
-        Ok(false)
+        Ok(None)
     }
 
     /// Notes who has crossed a periodic face since the last search, and whom that concerns.

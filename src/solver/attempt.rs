@@ -21,6 +21,8 @@ pub(super) struct Attempt<'a, const D: usize, S: MovingScene<D>, St: Stepper<Mov
     surveyed: u64,
     remeshings: u64,
     dropped: Dropped<S::Value>,
+    /// Whether the stepper has taken a step.
+    stepped: bool,
     kept: bool,
 }
 
@@ -30,8 +32,10 @@ impl<'a, const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>
         let mut work = std::mem::take(&mut run.work);
         // A clone of a pair would allocate.
         work.assign(&run.state);
+        run.moving.keep_searches();
         let dropped = Dropped { count: 0, sum: S::Value::ZERO, absolute: S::Value::ZERO };
-        Self { turns: run.turns, run, work, before: None, surveyed, remeshings: 0, dropped, kept: false }
+        let (turns, before, stepped, kept) = (run.turns, None, false, false);
+        Self { run, work, before, turns, surveyed, remeshings: 0, dropped, stepped, kept }
     }
 
     /// Takes the step as it is, and says how many substeps that were.
@@ -72,8 +76,9 @@ impl<'a, const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>
 
     /// Makes the run what the step has made of it.
     pub(super) fn keep(mut self) {
-        let Self { run, work, before, turns, surveyed, remeshings, dropped, kept } = &mut self;
+        let Self { run, work, before, turns, surveyed, remeshings, dropped, kept, .. } = &mut self;
         std::mem::swap(&mut run.state, work);
+        run.moving.keep_searches();
         *before = None;
         (run.turns, run.surveyed) = (*turns, *surveyed);
         run.ledger.remeshings += *remeshings;
@@ -86,9 +91,10 @@ impl<'a, const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>
 
     /// One step of the stepper, volumes and places checked.
     fn substep(&mut self, t: f64, dt: f64) -> Result<()> {
-        let Self { run, work, .. } = self;
+        let Self { run, work, stepped, .. } = self;
         let Lagrangian { moving, stepper, state: checked, .. } = &mut **run;
         stepper.step(t, dt, work, &mut |t, state, rates| moving.rate(t, state, checked, rates))?;
+        *stepped = true;
         if let Some((p, &volume)) = work.1.1.iter().enumerate().find(|(_, volume)| !(**volume > 0.0)) {
             return Err(Error::from(SolverError::Volume { volume, t: t + dt }).at(p));
         }
@@ -143,7 +149,11 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> D
             self.run.moving.held = before;
         }
         if !self.kept {
-            self.run.stepper.reset();
+            self.run.moving.undo_searches();
+            // A step of its own that fails leaves a stepper as it was.
+            if self.stepped {
+                self.run.stepper.reset();
+            }
         }
     }
 }

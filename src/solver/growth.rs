@@ -25,6 +25,9 @@ const MOST: usize = 1000;
 /// The same on a set that has moved: modes that are not found in so few grow too slowly to matter before the set is another.
 const ON_THE_WAY: usize = 96;
 
+/// Vectors of that search, few enough for the restarts without which it does not settle.
+const FEW_VECTORS: usize = 24;
+
 /// The largest legal growth rate over the spectral radius, for rows of these fields.
 pub(super) fn legal<E: Fields>() -> f64 {
     LIMIT.max(ROUNDING * E::EPSILON)
@@ -79,51 +82,48 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
             return Ok(f64::NAN);
         }
         let spectrum = self.spectrum(t)?;
-        let found = Self::check_growth(&spectrum);
-        if found.is_err() {
-            return if policy == GrowthPolicy::Allow { Ok(spectrum.abscissa) } else { found };
-        }
         // Runs along the imaginary axis may converge to an eigenvalue that is not the rightmost.
-        let known = spectrum.exact || spectrum.converged && !self.oscillates(t)?;
-        if known { found } else { Ok(f64::NAN) }
+        let settled = spectrum.exact || spectrum.converged && !self.oscillates(t)?;
+        recorded::<S::Value>(&spectrum, settled, policy)
     }
+}
 
-    /// Refuses a spectrum with modes that are known to grow, and returns their rate otherwise.
-    ///
-    /// # Errors
-    /// [`SolverError::Growing`].
-    pub(super) fn check_growth(spectrum: &Spectrum) -> Result<f64> {
-        let limit = legal::<S::Value>();
-        // What the residual leaves open is no proof of growth, but estimates that did not converge are good to this too.
-        let open = if spectrum.exact { 0.0 } else { spectrum.residual.min(RESOLUTION * spectrum.radius) };
-        if spectrum.abscissa - open > limit * spectrum.radius {
-            let (rate, radius) = (spectrum.abscissa, spectrum.radius);
-            return Err(SolverError::Growing { rate, radius, limit }.into());
-        }
-        Ok(spectrum.abscissa)
+/// The growth rate of a spectrum as the policy wants it; NaN where no growth is found, nor is it `settled` that there is none.
+///
+/// # Errors
+/// [`SolverError::Growing`] where it is refused.
+fn recorded<E: Fields>(spectrum: &Spectrum, settled: bool, policy: GrowthPolicy) -> Result<f64> {
+    let (rate, radius, limit) = (spectrum.abscissa, spectrum.radius, legal::<E>());
+    // What the residual leaves open is no proof of growth, but estimates that did not converge are good to this too.
+    let open = if spectrum.exact { 0.0 } else { spectrum.residual.min(RESOLUTION * radius) };
+    match (rate - open > limit * radius, policy) {
+        (true, GrowthPolicy::Refuse) => Err(SolverError::Growing { rate, radius, limit }.into()),
+        (true, _) => Ok(rate),
+        (false, _) => Ok(if settled { rate } else { f64::NAN }),
     }
 }
 
 impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
-    /// The growth rate of the diffusion term on the set of the start; NaN where the policy asks for none.
+    /// The growth rate of the diffusion term on the set of the start; NaN where the policy asks for none, and where neither
+    /// growth is found nor excluded.
     pub(super) fn growth_at_the_start(&self, policy: GrowthPolicy) -> Result<f64> {
-        self.growth(policy, MOST)
+        self.growth(policy, SpectrumEstimator::new().most(MOST))
     }
 
-    /// The same on a set that has moved; NaN also where no spectrum is found, which is no proof of growth.
+    /// The same on a set that has moved; NaN also where no spectrum is found at all.
     pub(super) fn growth_on_the_way(&self, policy: GrowthPolicy) -> Result<f64> {
-        match self.growth(policy, ON_THE_WAY) {
+        match self.growth(policy, SpectrumEstimator::new().subspace(FEW_VECTORS).most(ON_THE_WAY)) {
             Err(error) if matches!(error.kind(), ErrorKind::Linear(LinearError::NotConverged { .. })) => Ok(f64::NAN),
             found => found,
         }
     }
 
-    fn growth(&self, policy: GrowthPolicy, products: usize) -> Result<f64> {
-        match policy {
-            GrowthPolicy::Unknown => Ok(f64::NAN),
-            GrowthPolicy::Allow => Ok(self.spectrum(products)?.abscissa),
-            GrowthPolicy::Refuse => SemiDiscrete::<D, S>::check_growth(&self.spectrum(products)?),
+    fn growth(&self, policy: GrowthPolicy, estimator: SpectrumEstimator) -> Result<f64> {
+        if policy == GrowthPolicy::Unknown {
+            return Ok(f64::NAN);
         }
+        let spectrum = self.spectrum(estimator)?;
+        recorded::<S::Value>(&spectrum, spectrum.converged, policy)
     }
 }
 

@@ -261,7 +261,9 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
     /// is [watched](Self::watching); [`SolverError::Drift`] above the [`drift_budget`](Self::drift_budget);
     /// [`DomainError::Outside`](crate::DomainError::Outside) naming one that leaves the domain, and
     /// [`MeshError::Support`](crate::MeshError::Support) one whose support leaves the mesh; as [`Stepper::step`],
-    /// [`MovingDiffusion::check`] and [`MovingDiffusion::rates`]. The run is then as it was.
+    /// [`MovingDiffusion::check`] and [`MovingDiffusion::rates`]. The run is then as it was, and a step that is taken after
+    /// all has the bits it would have had; but a stepper that remembers earlier steps starts anew where its own step was done
+    /// and something else was refused.
     pub fn step(&mut self, dt: f64) -> Result<&LedgerRow<D>> {
         self.step_to(dt, self.t + dt)
     }

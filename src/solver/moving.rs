@@ -11,7 +11,7 @@ use crate::apply::Report;
 use crate::apply::blocks::each_row;
 use crate::domain::Domain;
 use crate::error::{Error, Limit, Result, SolverError, TimeError};
-use crate::linear::Spectrum;
+use crate::linear::{Spectrum, SpectrumEstimator};
 use crate::particles::Particles;
 use crate::scale::Volumes;
 use crate::time::{Entry, RowSymmetry};
@@ -169,6 +169,14 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         self.scene.diffusion_term().searches(&self.held.kept)
     }
 
+    pub(super) fn keep_searches(&mut self) {
+        self.scene.diffusion_term().keep_searches(&mut self.held.kept);
+    }
+
+    pub(super) fn undo_searches(&mut self) {
+        self.scene.diffusion_term().undo_searches(&mut self.held.kept);
+    }
+
     pub(super) fn admits(&self, spacing: crate::scale::Spacing) -> Result<()> {
         self.scene.diffusion_term().admits(&self.held.kept, spacing)
     }
@@ -291,9 +299,9 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         Ok((limits, checked.map(|(report, _)| report)))
     }
 
-    /// The rightmost eigenvalue and the spectral radius of the diffusion rows of now, in so many products each.
-    pub(super) fn spectrum(&self, products: usize) -> Result<Spectrum> {
-        self.scene.diffusion_term().spectrum(&self.held.kept, products)
+    /// The rightmost eigenvalue and the spectral radius of the diffusion rows of now.
+    pub(super) fn spectrum(&self, estimator: SpectrumEstimator) -> Result<Spectrum> {
+        self.scene.diffusion_term().spectrum(&self.held.kept, estimator)
     }
 
     /// Whether V_p w_pq = V_q w_qp in the rows of now, found by applying them to two fields.

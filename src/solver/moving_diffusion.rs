@@ -72,6 +72,12 @@ pub trait MovingDiffusion<const D: usize, E: Fields>: Sync {
     /// As [`VerletList::update`].
     fn follow(&self, kept: &mut Self::Kept, particles: &Particles<D>) -> Result<()>;
 
+    /// Makes the search of now the one that [`undo_searches`](Self::undo_searches) goes back to.
+    fn keep_searches(&self, kept: &mut Self::Kept);
+
+    /// Goes back to the search that was kept last: it decides the order of every sum.
+    fn undo_searches(&self, kept: &mut Self::Kept);
+
     /// Refuses a lattice on which the rows would be illegal.
     ///
     /// # Errors
@@ -85,12 +91,12 @@ pub trait MovingDiffusion<const D: usize, E: Fields>: Sync {
     /// Naming the particle whose row is illegal.
     fn check(&self, kept: &Self::Kept, u: &[E], out: &mut [E]) -> Result<Option<(Report, f64)>>;
 
-    /// The rightmost eigenvalue and the spectral radius of the rows of now, each in at most so many products; zero without
-    /// one where no weight is negative.
+    /// The rightmost eigenvalue and the spectral radius of the rows of now; zero without a product where no weight is
+    /// negative.
     ///
     /// # Errors
     /// As [`Rows::assemble`] and [`SpectrumEstimator::estimate`].
-    fn spectrum(&self, kept: &Self::Kept, products: usize) -> Result<Spectrum>;
+    fn spectrum(&self, kept: &Self::Kept, estimator: SpectrumEstimator) -> Result<Spectrum>;
 
     /// Writes `finish`(p, div(D grad u)_p) for every particle.
     ///
@@ -136,6 +142,10 @@ impl<const D: usize, E: Fields> MovingDiffusion<D, E> for () {
         Ok(())
     }
 
+    fn keep_searches(&self, (): &mut ()) {}
+
+    fn undo_searches(&self, (): &mut ()) {}
+
     fn admits(&self, (): &(), _: Spacing) -> Result<()> {
         Ok(())
     }
@@ -144,7 +154,7 @@ impl<const D: usize, E: Fields> MovingDiffusion<D, E> for () {
         Ok(None)
     }
 
-    fn spectrum(&self, (): &(), _: usize) -> Result<Spectrum> {
+    fn spectrum(&self, (): &(), _: SpectrumEstimator) -> Result<Spectrum> {
         Ok(Spectrum::default())
     }
 
@@ -163,6 +173,8 @@ impl<const D: usize, E: Fields> MovingDiffusion<D, E> for () {
 pub struct MovingRows<const D: usize, M: Method<D, Out = [f64; 1]>> {
     term: Term<D, M>,
     list: VerletList<D>,
+    /// The list of the search that was kept, where there were others since.
+    former: Option<VerletList<D>>,
     domain: Domain<D>,
     cutoff: f64,
     /// Searches of the lists before this one, its own first search among them.
@@ -246,18 +258,30 @@ impl<C: Diffusivity<D>, M: MovingMethod<D>, const D: usize, E: Fields> MovingDif
         let skin = settings.skin.unwrap_or((SKIN * reach).min(0.5 * (room - cutoff)).max(0.0));
         let reach = reach.min(room - skin).max(cutoff);
         let list = VerletList::build(particles, domain, Cutoff(reach), skin)?;
-        Ok(MovingRows { term, list, domain: *domain, cutoff, earlier: 0 })
+        Ok(MovingRows { term, list, former: None, domain: *domain, cutoff, earlier: 0 })
     }
 
     fn restart(&self, kept: &MovingRows<D, M>, particles: &Particles<D>, searches: u64) -> Result<MovingRows<D, M>> {
         let list = VerletList::build(particles, &kept.domain, Cutoff(kept.list.reach()), kept.list.skin())?;
         let term = Term::new(self, particles)?;
-        Ok(MovingRows { term, list, domain: kept.domain, cutoff: kept.cutoff, earlier: searches })
+        Ok(MovingRows { term, list, former: None, domain: kept.domain, cutoff: kept.cutoff, earlier: searches })
     }
 
     fn follow(&self, kept: &mut MovingRows<D, M>, particles: &Particles<D>) -> Result<()> {
-        kept.list.update(particles)?;
+        if let Some(replaced) = kept.list.replaced(particles)? {
+            kept.former.get_or_insert(replaced);
+        }
         kept.term.follow(self, particles)
+    }
+
+    fn keep_searches(&self, kept: &mut MovingRows<D, M>) {
+        kept.former = None;
+    }
+
+    fn undo_searches(&self, kept: &mut MovingRows<D, M>) {
+        if let Some(former) = kept.former.take() {
+            kept.list = former;
+        }
     }
 
     fn admits(&self, kept: &MovingRows<D, M>, spacing: Spacing) -> Result<()> {
@@ -274,11 +298,11 @@ impl<C: Diffusivity<D>, M: MovingMethod<D>, const D: usize, E: Fields> MovingDif
         Ok(Some((report, factor)))
     }
 
-    fn spectrum(&self, kept: &MovingRows<D, M>, products: usize) -> Result<Spectrum> {
+    fn spectrum(&self, kept: &MovingRows<D, M>, estimator: SpectrumEstimator) -> Result<Spectrum> {
         let within = kept.within();
         match &kept.term {
-            Term::Constant(method, factor, _) => spectrum(method, &within, *factor, products),
-            Term::Varying(method, _) => spectrum(method, &within, 1.0, products),
+            Term::Constant(method, factor, _) => spectrum(method, &within, *factor, estimator),
+            Term::Varying(method, _) => spectrum(method, &within, 1.0, estimator),
         }
     }
 
@@ -306,13 +330,13 @@ fn spectrum<const D: usize, M: Method<D, Out = [f64; 1]>>(
     method: &M,
     neighbors: &Within<'_, D>,
     factor: f64,
-    products: usize,
+    estimator: SpectrumEstimator,
 ) -> Result<Spectrum> {
     let rows = Rows::<[f64; 1]>::assemble(method, neighbors)?;
     if rows.cannot_grow(legal::<f64>()) {
         return Ok(Spectrum::default());
     }
-    SpectrumEstimator::new().most(products).estimate(neighbors.targets(), |u, du| {
+    estimator.estimate(neighbors.targets(), |u, du| {
         rows.apply(u, du)?;
         du.iter_mut().for_each(|du| *du *= factor);
         Ok(())

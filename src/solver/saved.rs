@@ -58,7 +58,7 @@ pub struct SavedParticles<E, St> {
     pub searched_at: Vec<f64>,
     /// The search after which growth was estimated last.
     pub surveyed: u64,
-    /// The growth rate found then, in 1/time; `None` where nothing was estimated.
+    /// The growth rate found then, in 1/time; `None` where nothing was estimated or settled.
     pub growth: Option<f64>,
     /// The stepper.
     pub stepper: St,

@@ -2,10 +2,12 @@
 //! ladder.
 
 use crate::solvers::{solve, stencil};
+use crate::stencils::Stencils;
 use num_dual::Dual64;
 use parops::{
-    Cholesky, ErrorKind, Ladder, Lu, MomentScratch, MomentSolver, MomentSystem, MultiIndex, OperatorError, PivotedQr,
-    Qr, Residual, Rung, Solution, Term, Window, graded,
+    CUTOFF_OVER_EPSILON, Cholesky, DcPse, Error, ErrorKind, Expression, Ladder, Lu, MomentScratch, MomentSolver,
+    MomentSystem, MultiIndex, MultiIndexError, OperatorError, PivotedQr, Qr, Residual, Rung, Scalar, Solution, Term,
+    Window, graded,
 };
 
 const EPS: f64 = f64::EPSILON;
@@ -137,6 +139,7 @@ fn systems_without_full_rank_are_refused_by_qr_and_solved_at_their_rank_with_piv
         let kind = |solver: &dyn Fn() -> Found<f64>| solver().err().map(|error| error.kind().clone());
         assert_eq!(kind(&|| weights(&Qr, &system)), singular(1));
         assert_eq!(kind(&|| weights(&Cholesky, &system)), singular(1));
+        assert_eq!(kind(&|| weights(&Lu, &system)), singular(0));
         let (solution, w) = weights(&PivotedQr, &system).unwrap();
         assert_eq!((solution.rung, solution.rank, solution.holds(&system)), (Rung::PivotedQr, 3, possible));
         let second: f64 = line().iter().zip(&w).map(|(z, w)| w * z[0] * z[0]).sum();
@@ -151,7 +154,8 @@ fn systems_without_full_rank_are_refused_by_qr_and_solved_at_their_rank_with_piv
     // No node at all, and one without a place.
     for z in [vec![], vec![[f64::NAN; 2]; 18]] {
         few.fill(&z, Window::Exponential, 2.2);
-        for solved in [weights(&Qr, &few), weights(&PivotedQr, &few), weights(&Cholesky, &few)] {
+        let solvers = [weights(&Qr, &few), weights(&PivotedQr, &few), weights(&Cholesky, &few), weights(&Lu, &few)];
+        for solved in solvers {
             let refused = matches!(solved.map_err(|error| error.kind().clone()),
                 Err(ErrorKind::Operator(OperatorError::Singular { neighbors, conditions: 9, rank: 0 })) if neighbors == z.len());
             assert!(refused, "{}", z.len());
@@ -187,4 +191,65 @@ fn ladder_keeps_what_is_sharp_and_falls_back_on_what_holds_where_nothing_better_
     for known in [Some(poor), None] {
         assert_eq!(climb(known, &impossible), weights(&PivotedQr, &impossible).unwrap());
     }
+}
+
+#[test]
+fn lu_refuses_systems_of_which_two_conditions_are_the_same() {
+    // On the diagonal x^i y^j depends on i + j alone.
+    let mut system = system([1, 1], 2);
+    system.fill(&line().iter().map(|z| [z[0]; 2]).collect::<Vec<_>>(), Window::Exponential, 3.2);
+    let kind = weights(&Lu, &system).unwrap_err().kind().clone();
+    assert_eq!(kind, ErrorKind::Operator(OperatorError::Singular { neighbors: 18, conditions: 9, rank: 0 }));
+}
+
+#[test]
+fn systems_of_illegal_orders_and_of_factorials_that_do_not_fit_are_refused() {
+    let refused = |degree: u8, order: u32| {
+        let terms = vec![vec![Term { index: MultiIndex::new([degree]), factor: 1.0 }]];
+        let error = MomentSystem::<f64, 1>::new(&terms, degree.into(), order, 0).err();
+        error.map(|error| error.kind().clone())
+    };
+    let order = |order| Some(ErrorKind::MultiIndex(MultiIndexError::Order { order, low: 1, high: 8 }));
+    assert_eq!([0, 1, 8, 9].map(|order| refused(2, order)), [order(0), None, None, order(9)]);
+    assert!(matches!(refused(200, 1), Some(ErrorKind::MultiIndex(MultiIndexError::Degree { degree: 200, .. }))));
+}
+
+/// A solver that always says the same.
+#[derive(Clone)]
+struct Refusing(OperatorError);
+
+impl MomentSolver for Refusing {
+    fn solve<T: Scalar, const D: usize>(
+        &self,
+        _: &MomentSystem<T, D>,
+        _: &mut MomentScratch<T>,
+        _: &mut [T],
+    ) -> parops::Result<Solution<T>> {
+        Err(self.0.clone().into())
+    }
+}
+
+#[test]
+fn rows_of_solvers_that_find_no_weights_are_refused_with_all_that_is_known() {
+    // The second of two targets has its neighbors on the first axis.
+    let second = Expression::new([(MultiIndex::new([2, 0]), 1.0)]).unwrap();
+    let sound = stencil::<2>(18, 0.3, 0, 1).iter().map(|z| z.map(|x| 0.99 * x)).collect();
+    let stencils = Stencils { offsets: vec![sound, line()], cutoff: CUTOFF_OVER_EPSILON };
+    fn refused<S: MomentSolver>(solver: S, second: &Expression<2>, stencils: &Stencils<2>) -> Error {
+        DcPse::at_order(second.clone(), 2).unwrap().solver(solver).assemble(stencils).unwrap_err()
+    }
+    let error = refused(Qr, &second, &stencils);
+    let ErrorKind::Operator(OperatorError::Uncertified { neighbors, conditions, rank, condition, residual, ratio }) =
+        *error.kind()
+    else {
+        panic!("{error}")
+    };
+    assert_eq!((error.particle(), neighbors, conditions, rank), (Some(1), 18, 9, 1));
+    // Nothing of the moment 2 is there.
+    assert_eq!((condition, residual), (f64::INFINITY, 2.0));
+    assert!((ratio / CUTOFF_OVER_EPSILON - 1.0).abs() < 4.0 * EPS, "{ratio}");
+    // What is no matter of rank is handed on as it is.
+    let own = OperatorError::Setting { value: 7.0 };
+    let error = refused(Refusing(own.clone()), &second, &stencils);
+    assert_eq!((error.kind(), error.particle()), (&ErrorKind::Operator(own), Some(0)));
 }

@@ -571,3 +571,16 @@ fn tensors_may_miss_symmetry_by_a_rounding_of_their_largest_entry_at_any_scale()
     }
     Ok(())
 }
+
+#[test]
+fn targets_off_the_particles_have_no_tensor_though_their_second_derivatives_have_rows() -> Failure {
+    let particles = Particles::jittered([0.0; 2], [1.0; 2], [12; 2], 0.3, 1)?;
+    let hessian = DcPse::<Hessian<2>, 2>::new();
+    let between = CellList::build_at(&[[0.51, 0.52]], &particles, &Domain::open(), hessian.cutoff(&particles)?)?;
+    let rows = hessian.assemble(&between)?;
+    let error = DivTensorGrad::new(hessian, &[[[1.0, 0.0], [0.0, 1.0]]; 144])?.assemble(&between).unwrap_err();
+    let neighbors = rows.row(0).map_or(0, |row| row.sources.len());
+    let due = ErrorKind::Operator(OperatorError::NoCenter { neighbors });
+    assert_eq!((error.kind(), error.particle()), (&due, Some(0)));
+    Ok(())
+}

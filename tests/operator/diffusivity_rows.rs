@@ -2,8 +2,8 @@
 
 use super::by_hand::{COUNT, EPSILON, Made, TARGET, gain, made, near, negative, stencil, volumes};
 use parops::{
-    CONTRAST_LIMIT, Contraction, DcPse, DivGrad, DivTensorGrad, Epsilon, ErrorKind, Form, Hessian, Laplacian, Mean,
-    Method, Neighbor, Operator, OperatorError, Pse, Random, Result, RowReport, Stencil,
+    CONTRAST_LIMIT, CellList, Contraction, DcPse, DivGrad, DivTensorGrad, Domain, Epsilon, ErrorKind, Form, Hessian,
+    Laplacian, Mean, Method, Neighbor, Operator, OperatorError, Particles, Pse, Random, Result, RowReport, Stencil,
 };
 
 #[test]
@@ -190,4 +190,21 @@ fn means_are_symmetric_to_the_bit_and_right_where_products_and_ratios_leave_the_
     for (a, b) in [(1e-200, 1e200), (1e-300, 1e300)] {
         assert_eq!((Mean::Harmonic.of(a, b), Mean::Harmonic.of(b, a)), (2.0 * a, 2.0 * a));
     }
+}
+
+#[test]
+fn contracted_weights_that_overflow_are_refused_with_the_neighbor() -> Result<()> {
+    // Weights of some hundreds, each of them finite.
+    let particles = Particles::jittered([0.0; 2], [1.0; 2], [12; 2], 0.3, 1)?;
+    let (laplacian, hessian) = (DcPse::<Laplacian<2>, 2>::new(), DcPse::<Hessian<2>, 2>::new());
+    let cells = CellList::build(&particles, &Domain::open(), laplacian.cutoff(&particles)?)?;
+    let large = 1e307;
+    let contracted = Contraction::new(laplacian, vec![[large]; 144])?.assemble(&cells).err();
+    let tensors = DivTensorGrad::new(hessian, &[[[large, 0.0], [0.0, large]]; 144])?.assemble(&cells).err();
+    for error in [contracted, tensors] {
+        let error = error.expect("refused");
+        let ErrorKind::Operator(OperatorError::Weight { q, weight }) = *error.kind() else { panic!("{error}") };
+        assert!(error.particle().is_some_and(|p| p < 144) && q < 144 && !weight.is_finite(), "{error}");
+    }
+    Ok(())
 }

@@ -272,3 +272,16 @@ fn order_four_with_the_arithmetic_mean_grows_across_a_contrast_of_100_and_nothin
     }
     Ok(())
 }
+
+#[test]
+fn targets_off_the_particles_have_no_flux_though_their_laplacian_has_a_row() -> Failure {
+    let particles = Particles::jittered([0.0; 2], [1.0; 2], [12; 2], 0.3, 1)?;
+    let laplacian = DcPse::<Laplacian<2>, 2>::new();
+    let between = CellList::build_at(&[[0.51, 0.52]], &particles, &Domain::open(), laplacian.cutoff(&particles)?)?;
+    let rows = laplacian.assemble(&between)?;
+    let error = DivGrad::new(laplacian, vec![1.0; particles.len()])?.assemble(&between).unwrap_err();
+    let neighbors = rows.row(0).map_or(0, |row| row.sources.len());
+    let due = ErrorKind::Operator(OperatorError::NoCenter { neighbors });
+    assert_eq!((error.kind(), error.particle()), (&due, Some(0)));
+    Ok(())
+}

@@ -505,3 +505,53 @@ fn differentiated_kernel_keeps_order_support_and_overlap_limit_of_its_kernel() -
     keeps(Gaussian::<2>::new())?;
     keeps(HighOrderGaussian::<2>::new(4)?)
 }
+
+/// The Gaussian, with derivatives at the middle alone.
+#[derive(Clone)]
+struct MiddleOnly(Gaussian<2>);
+
+impl Kernel<f64, 2> for MiddleOnly {
+    fn value(&self, z: &[f64; 2]) -> f64 {
+        self.0.value(z)
+    }
+
+    fn terms(&self) -> &[Term<2>] {
+        Kernel::<f64, 2>::terms(&self.0)
+    }
+
+    fn order(&self) -> u32 {
+        Kernel::<f64, 2>::order(&self.0)
+    }
+
+    fn support(&self) -> f64 {
+        Kernel::<f64, 2>::support(&self.0)
+    }
+
+    fn overlap_limit(&self) -> f64 {
+        Kernel::<f64, 2>::overlap_limit(&self.0)
+    }
+}
+
+impl SmoothingKernel<f64, 2> for MiddleOnly {
+    fn derivative(&self, beta: MultiIndex<2>, z: &[f64; 2]) -> Result<f64, Error> {
+        if *z == [0.0; 2] {
+            return self.0.derivative(beta, z);
+        }
+        Err(KernelError::Regularity { kernel: "MiddleOnly", degree: beta.degree(), limit: 0 }.into())
+    }
+
+    fn normalization(&self) -> f64 {
+        SmoothingKernel::<f64, 2>::normalization(&self.0)
+    }
+}
+
+#[test]
+fn kernel_that_loses_its_derivatives_after_all_gives_no_row() -> Failure {
+    let particles = lattice(12);
+    let sph = Sph::new(derivative([1, 0]), MiddleOnly(Gaussian::new()), Epsilon::global(0.12)?, particles.volumes()?)?;
+    let cells = CellList::build(&particles, &torus(), Cutoff(0.4))?;
+    let error = sph.support(3.0)?.allow(Allowance::Everywhere).assemble(&cells).unwrap_err();
+    let ErrorKind::Operator(OperatorError::Weight { weight, .. }) = *error.kind() else { panic!("{error}") };
+    assert!(weight.is_nan() && error.particle().is_some());
+    Ok(())
+}

@@ -13,6 +13,7 @@ mod eulerian_stiff;
 mod hyperviscosity;
 mod jump;
 mod lagrangian;
+mod lagrangian_faults;
 mod lagrangian_growth;
 mod longest_step;
 mod relations;
