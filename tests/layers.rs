@@ -1,5 +1,6 @@
 //! Imports point one way: every module of `src` uses only its own layer and those before it.
 
+use parops::testing::Promise;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
@@ -215,7 +216,7 @@ fn imports_point_to_earlier_layers() {
         names += root_names(&source, file.components().count()).len();
         all.extend(faults(file, &source));
     }
-    assert!(all.is_empty(), "{} upward or nameless imports:\n{}", all.len(), all.join("\n"));
+    Promise::new("Structure", "imports point to earlier layers").case(all.join("\n")).holds(all.is_empty());
     // Every file but the lowest imports something; a reader that sees nothing must not pass.
     assert!(names >= files.len() / 2, "only {names} imports seen in {} files", files.len());
 }

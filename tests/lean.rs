@@ -1,4 +1,4 @@
-//! What six scenes take: bytes a particle against what the arithmetic says, allocations, sweeps over rows a step.
+//! What six scenes take: bytes a particle against what the arithmetic says, allocations, sweeps over rows a step or solve.
 //!
 //! Their packages and the size of their programs are checked by `.ci/lean`, their results by the examples `lean_*`.
 //! Several threads have pools that allocate: nothing is measured with the feature `rayon`.
@@ -23,6 +23,8 @@ thread_local! {
     /// Below zero where a thread gives back what another one took.
     static USED: Cell<isize> = const { Cell::new(0) };
     static PEAK: Cell<isize> = const { Cell::new(0) };
+    /// Rows that are swept: how often one is taken, by whatever goes through them.
+    static TAKEN: Cell<usize> = const { Cell::new(0) };
 }
 
 /// While a thread ends its counters may be gone; nothing is measured then.
@@ -136,9 +138,6 @@ fn pairs(neighbors: &impl Neighbors<2>, cutoff: impl Fn(usize) -> f64) -> f64 {
     (0..N).map(|p| neighbors.count(p, cutoff(p))).sum::<usize>() as f64 / N as f64
 }
 
-/// Rows that are swept: how often one is taken, by whatever goes through them.
-static TAKEN: AtomicUsize = AtomicUsize::new(0);
-
 /// An upwind scheme whose rows are counted when they are taken.
 struct Counted(UpwindGradient<2>);
 
@@ -161,12 +160,12 @@ impl Transport<2> for Counted {
 
 impl<E: Fields> TransportRows<2, E> for CountedRows<E> {
     fn along(&self, p: usize, v: &[f64; 2], u: &[E]) -> E {
-        TAKEN.fetch_add(1, Relaxed);
+        TAKEN.set(TAKEN.get() + 1);
         self.0.along(p, v, u)
     }
 
     fn entries(&self, p: usize, v: &[f64; 2], entry: &mut dyn FnMut(usize, f64)) {
-        TAKEN.fetch_add(1, Relaxed);
+        TAKEN.set(TAKEN.get() + 1);
         self.0.entries(p, v, entry);
     }
 
@@ -316,9 +315,9 @@ fn upwind_takes_rows_and_places_and_sweeps_once_a_step() -> Result<()> {
     assert!(stepped.is_ok());
     exactly("the first upwind step of Euler", first.held, 2.0 * NUMBER);
     calls.store(0, Relaxed);
-    TAKEN.store(0, Relaxed);
+    TAKEN.set(0);
     let (stepped, later) = cost(|| (0..5).try_for_each(|_| run.step(&mut u, 1e-4).map(drop)));
-    let sweeps = TAKEN.load(Relaxed) as f64 / (5 * N) as f64;
+    let sweeps = TAKEN.get() as f64 / (5 * N) as f64;
     Promise::new("Work", "sweeps over the rows of an upwind step of Euler").at_most(1.0, sweeps);
     // One velocity a particle for its row, one each for the limits at both ends of the step, because it may change.
     assert_eq!((stepped, later.peak, later.allocations, calls.load(Relaxed)), (Ok(()), 0.0, 0, 5 * 3 * N));
@@ -409,6 +408,37 @@ fn implicit_steps_take_rows_and_three_matrices() -> Result<()> {
     for _ in 0..5 {
         run.step(&mut u, 0.1)?;
         products("an implicit step of 4096 particles", PRODUCTS, run.stepper().last_solve().iterations);
+    }
+    Ok(())
+}
+
+#[test]
+fn balances_and_implicit_steps_sweep_their_rows_for_their_matrix_alone() -> Result<()> {
+    /// Rows are taken once to be counted and once to be stored: products, factors and later steps are the matrix's own.
+    const MATRIX: f64 = 2.0;
+    let set = scattered()?;
+    let upwind = UpwindGradient::new(Spacing(1.0 / SIDE as f64).epsilon(1.0)?, set.volumes()?).support(3.0)?;
+    let neighbors = CellList::build(&set, &torus()?, upwind.cutoff())?;
+    // Rows of advection are swept with those of diffusion; the source gives the field a level.
+    let scene = || {
+        let diffusing = AdvectionDiffusion::<2>::new().diffusion(1.0, DcPse::<Laplacian<2>, 2>::new());
+        diffusing.advection([1.0, 0.5], Counted(upwind.clone())).source(|_, _, u| 1.0 - u)
+    };
+    TAKEN.set(0);
+    let swept = |what: &'static str, most: f64| {
+        let sweeps = TAKEN.replace(0) as f64 / N as f64;
+        Promise::new("Work", format!("sweeps over the rows of {what}")).at_most(most, sweeps);
+    };
+    steady(scene(), &set, &neighbors)?;
+    swept("a steady solve", MATRIX);
+    let mut run = Eulerian::new(scene(), &set, &neighbors, ImplicitScheme::euler())?;
+    swept("an implicit scene when it is made", 0.0);
+    let mut u = vec![0.5; N];
+    run.step(&mut u, 0.1)?;
+    swept("the first implicit step", MATRIX);
+    for _ in 0..5 {
+        run.step(&mut u, 0.1)?;
+        swept("an implicit step after the first", 0.0);
     }
     Ok(())
 }

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{DMatrix, DVector};
 use parops::{
     Apply, CellList, Cutoff, DcPse, DivGrad, Domain, ErrorKind, Face, Laplacian, Mean, OperatorError, ParticleError,
-    Particles, Pse, Rows,
+    Particles, Pse, Rows, testing::Promise,
 };
 
 type Failure = Result<(), parops::Error>;
@@ -35,12 +35,14 @@ fn dcpse_is_exact_where_the_degrees_of_diffusivity_and_field_add_up_to_r_plus_on
     let mut out = vec![0.0; f.len()];
     let rows = div_grad.assemble(&neighbors)?;
     rows.apply(&f, &mut out)?;
-    assert!(largest_error(&particles, &out, exact) < TOLERANCE);
+    Promise::new("Residuals", "div(D grad f) of r = 4, degrees of D and f add up to 5")
+        .at_most(TOLERANCE, largest_error(&particles, &out, exact));
     let mut free = vec![0.0; f.len()];
     div_grad.matrix_free(&neighbors)?.apply(&f, &mut free)?;
-    assert_eq!(out, free);
+    Promise::new("Reproducibility", "matrix-free div(D grad f), bits of stored rows").equal(&out, &free);
     rows.apply(&vec![3.7; f.len()], &mut out)?;
-    assert!(out.iter().all(|&out| out == 0.0), "a constant is not annihilated");
+    let size = out.iter().fold(0.0_f64, |size, out| size.max(out.abs()));
+    Promise::new("Metamorphic relations", "M9 div(D grad f) of a constant").at_most(0.0, size);
     Ok(())
 }
 
@@ -54,7 +56,11 @@ fn constant_diffusivity_gives_the_bits_of_the_laplacian_times_it_for_either_mean
         let scaled = DivGrad::new(laplacian.clone(), vec![0.7; particles.len()])?.mean(mean).assemble(&neighbors)?;
         for p in 0..particles.len() {
             let (plain, scaled) = (plain.row(p).unwrap(), scaled.row(p).unwrap());
-            assert!(plain.weights.iter().zip(scaled.weights).all(|(w, s)| 0.7 * w[0] == s[0]));
+            Promise::new(
+                "Metamorphic relations",
+                "rows of div(D grad f) for a constant D, bits of D times the Laplacian",
+            )
+            .holds(plain.weights.iter().zip(scaled.weights).all(|(w, s)| 0.7 * w[0] == s[0]));
         }
     }
     Ok(())
@@ -82,8 +88,11 @@ fn shares_of_odd_images_are_scaled_pair_by_pair() -> Failure {
     };
     let (half, whole) = (apply(&half, &mirror)?, apply(&whole, &torus)?);
     // Sums of 24 pairs whose weights are up to (h epsilon^2)^-1 h.
-    let tolerance = 100.0 * f64::EPSILON * (N as f64 / 2.0).powi(2);
-    assert!(half.iter().zip(&whole).all(|(half, whole)| (half - whole).abs() < tolerance), "{half:?} {whole:?}");
+    let unit = f64::EPSILON * (N as f64 / 2.0).powi(2);
+    let off = half.iter().zip(&whole).map(|(half, whole)| (half - whole).abs()).fold(0.0, f64::max);
+    Promise::new("Metamorphic relations", "div(D grad f) between odd mirrors against the doubled torus")
+        .in_units("eps/epsilon^2", unit)
+        .at_most(100.0, off);
     Ok(())
 }
 
@@ -162,8 +171,12 @@ fn smooth_diffusivity_keeps_the_order_of_the_laplacian_on_jittered_sets_with_eit
     for mean in [Mean::Arithmetic, Mean::Harmonic] {
         for r in [2, 4] {
             let order = observed_order(r, mean)?;
-            println!("{mean:?}, r = {r}: {order:.3}");
-            assert!((order - f64::from(r)).abs() < 0.1, "{mean:?}, r = {r}: {order}");
+            let design = f64::from(r);
+            Promise::new("Orders", format!("div(D grad f) on jittered sets, {mean:?} mean, r = {r}")).within(
+                design - 0.1,
+                design + 0.1,
+                order,
+            );
         }
     }
     Ok(())
@@ -213,21 +226,20 @@ fn flux_through_a_jump_is_right_with_the_harmonic_mean_and_several_times_worse_w
         let sum: Result<f64, _> = (0..3).map(|seed| layered_error::<1>(n, seed, 2, mean, 100.0)).sum();
         Ok(sum? / 3.0)
     };
+    let worse = Promise::new("Accuracy", "error across a jump of 100, arithmetic over harmonic mean");
     let mut points = Vec::new();
     for n in [20, 40, 80, 160] {
         let (harmonic, arithmetic) = (mean_error(n, Mean::Harmonic)?, mean_error(n, Mean::Arithmetic)?);
-        println!("1D, {n}: harmonic {harmonic:.2e}, arithmetic {arithmetic:.2e}");
-        assert!(5.0 * harmonic < arithmetic, "{n}: {harmonic} {arithmetic}");
+        worse.at_least(5.0, arithmetic / harmonic);
         points.push((-(n as f64).ln(), harmonic.ln()));
     }
     let order = slope(&points);
-    println!("order {order:.2}");
-    assert!((0.8..1.5).contains(&order), "{order}");
+    Promise::new("Orders", "div(D grad f) across a jump of 100 in 1D, harmonic mean").within(0.8, 1.5, order);
     for r in [2, 4] {
         let harmonic = layered_error::<2>(24, 1, r, Mean::Harmonic, 100.0)?;
         let arithmetic = layered_error::<2>(24, 1, r, Mean::Arithmetic, 100.0)?;
-        println!("2D, r = {r}: harmonic {harmonic:.2e}, arithmetic {arithmetic:.2e}");
-        assert!(5.0 * harmonic < arithmetic && harmonic < 0.02, "{r}: {harmonic} {arithmetic}");
+        worse.at_least(5.0, arithmetic / harmonic);
+        assert!(harmonic < 0.02, "{r}: {harmonic}");
     }
     Ok(())
 }
@@ -253,8 +265,8 @@ fn order_four_with_the_arithmetic_mean_grows_across_a_contrast_of_100_and_nothin
     const ZERO: f64 = 1e-12;
     for seed in 0..3 {
         let (growing, rows, mixed) = growth(4, Mean::Arithmetic, 100.0, seed)?;
-        println!("seed {seed}: {growing:.2e} of the largest, {mixed} of {} rows reach across", rows.targets());
-        assert!(growing > 1e-3, "seed {seed}: {growing}");
+        Promise::new("Limits of steps", "growth of r = 4 across a contrast of 100, arithmetic mean, of the radius")
+            .at_least(1e-3, growing);
         let report = rows.report();
         assert_eq!((report.contrast, report.growing), (100.0, mixed));
         assert!(0 < mixed && mixed < rows.targets());
@@ -268,7 +280,9 @@ fn order_four_with_the_arithmetic_mean_grows_across_a_contrast_of_100_and_nothin
     ] {
         let (stable, rows, _) = growth(r, mean, contrast, 0)?;
         assert_eq!((rows.report().contrast, rows.report().growing), (contrast, 0));
-        assert!(stable < ZERO, "r = {r}, {mean:?}, contrast {contrast}: {stable}");
+        Promise::new("Limits of steps", "growth of div(D grad f) that the report does not flag, of the radius")
+            .case(format!("r = {r}, {mean:?}, contrast {contrast}"))
+            .at_most(ZERO, stable);
     }
     Ok(())
 }

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, SQRT_2, TAU};
 use parops::{
     AdvectionDiffusion, Boundary, CellList, Cutoff, DcPse, Domain, ErrorKind, Euler, Eulerian, Face, Gaussian,
     Gradient, GrowthPolicy, Laplacian, Limit, Nearest, Particles, Pse, Rate, Result, Rk4, Scene, SolverError, Sph,
-    SphForm, SspRk3, StepPolicy, TimeScheme, UpwindGradient,
+    SphForm, SspRk3, StepPolicy, TimeScheme, UpwindGradient, testing::Promise,
 };
 
 /// A ring of n particles on a lattice, h = 1/n.
@@ -29,8 +29,11 @@ fn spike(n: usize) -> Vec<f64> {
     (0..n).map(|p| f64::from(u8::from(p == n / 3))).collect()
 }
 
-fn is_unstable(error: &parops::Error, of: Limit) -> bool {
-    matches!(error.kind(), ErrorKind::Solver(SolverError::Unstable { term, .. }) if *term == of)
+fn refused_as_unstable(error: &parops::Error, of: Limit) {
+    let unstable = matches!(error.kind(), ErrorKind::Solver(SolverError::Unstable { term, .. }) if *term == of);
+    Promise::new("Limits of steps", "steppers that no step makes stable are refused with the term")
+        .case(error)
+        .holds(unstable);
 }
 
 #[test]
@@ -39,12 +42,12 @@ fn explicit_euler_with_central_advection_is_refused_and_grows() -> Result<()> {
     let (ring, neighbors) = ring(n)?;
     let scene = || AdvectionDiffusion::<1>::new().advection([1.0], pse_gradient(&ring, 2.0).unwrap());
     let error = Eulerian::new(scene(), &ring, &neighbors, Euler::new()).err().unwrap();
-    assert!(is_unstable(&error, Limit::Advection), "{error}");
+    refused_as_unstable(&error, Limit::Advection);
     // With diffusion beside it too: eq. 6.25 is about the advection.
     let volumes = ring.volumes()?;
     let laplacian = Pse::new(Laplacian::<1>, 2, ring.spacing()?.epsilon(2.0)?, volumes)?;
     let error = Eulerian::new(scene().diffusion(0.1, laplacian), &ring, &neighbors, Euler::new()).err().unwrap();
-    assert!(is_unstable(&error, Limit::Advection), "{error}");
+    refused_as_unstable(&error, Limit::Advection);
 
     // Eq. 6.25: the mode at kappa = sqrt 2 grows by sqrt(1 + c^2 2/e) a step.
     let (c, epsilon, steps) = (0.5, 2.0 / n as f64, 200);
@@ -81,8 +84,11 @@ fn rk4_with_central_advection_is_stable_to_3_29_and_not_beyond() -> Result<()> {
         }
         Ok(norm(&u))
     };
-    assert!(after(3.29, StepPolicy::Refuse)? <= 1.0 + 1e-10);
-    assert!(after(3.31, StepPolicy::Allow)? > 10.0);
+    let size = |text| Promise::new("Limits of steps", text);
+    size("size after 2000 steps of RK4, central PSE advection at c = 3.29")
+        .at_most(1.0 + 1e-10, after(3.29, StepPolicy::Refuse)?);
+    size("size after 2000 steps of RK4, central PSE advection at c = 3.31")
+        .at_least(10.0, after(3.31, StepPolicy::Allow)?);
     let error = start(StepPolicy::Refuse)?.step(&mut spike(n), 3.31 * epsilon).err().unwrap();
     match *error.kind() {
         ErrorKind::Solver(SolverError::Limit { dt, limit, binding: Limit::Advection }) => {
@@ -216,13 +222,18 @@ fn numerical_viscosity_of_upwind_is_reported_and_real() -> Result<()> {
     let mut run = Eulerian::new(scene, &ring, &neighbors, Rk4::new())?;
     // Errata 35: |v| epsilon / sqrt(pi).
     let viscosity = run.discrete().numerical_viscosity(0.0);
-    assert!((viscosity / (0.5 / n as f64 / PI.sqrt()) - 1.0).abs() < 1e-14);
+    let reported = Promise::new("Accuracy", "numerical viscosity reported for upwind over v epsilon/sqrt(pi), less 1");
+    reported.at_most(1e-14, (viscosity / (0.5 / n as f64 / PI.sqrt()) - 1.0).abs());
     let mut u: Vec<f64> = ring.points().iter().map(|x| (TAU * x[0]).sin()).collect();
     let start = norm(&u);
     run.advance(&mut u, 1.0, 1e-3)?;
     let decay = (norm(&u) / start).ln() / (TAU * TAU);
     // At epsilon = h the lattice has 1.8 % more of it than the integral.
-    assert!((-decay / viscosity - 1.0).abs() < 0.05, "{decay} {viscosity}");
+    Promise::new("Accuracy", "numerical viscosity seen in an upwind run over the one reported").within(
+        0.95,
+        1.05,
+        -decay / viscosity,
+    );
     Ok(())
 }
 
@@ -251,7 +262,12 @@ fn inflow_comes_in_and_outflow_leaves_as_the_flow_turns() -> Result<()> {
         let expected = SolverError::NoUpstream { axis: 0, velocity: -1.0 };
         assert_eq!((error.kind(), error.particle()), (&ErrorKind::Solver(expected), Some(n - 1)));
     }
-    assert!(errors[0] < 0.1 && (errors[0] / errors[1]).log2() > 0.8, "{errors:?}");
+    assert!(errors[0] < 0.1, "{errors:?}");
+    Promise::new("Orders", "upwind runs fed by inflow at either end in turns").within(
+        0.8,
+        1.2,
+        (errors[0] / errors[1]).log2(),
+    );
     Ok(())
 }
 
@@ -269,9 +285,16 @@ fn mirrors_hold_values_or_fluxes() -> Result<()> {
         let mut u: Vec<f64> = rod.points().iter().map(|x| wave(PI * x[0])).collect();
         run.advance(&mut u, end, 2e-4)?;
         let worst = rod.points().iter().zip(&u).map(|(x, u)| (u - decay * wave(PI * x[0])).abs()).fold(0.0, f64::max);
-        assert!(worst < 1e-6, "{face:?} {worst}");
+        Promise::new("Accuracy", "heat between mirrors, PSE of order 4, h = 1/80")
+            .case(format!("{face:?}"))
+            .at_most(1e-6, worst);
         // Only even mirrors keep what is between them.
-        assert_eq!(run.ledger().fields[0].drift.abs() < 1e-14, face == Face::MirrorEven);
+        let drift = run.ledger().fields[0].drift.abs();
+        if face == Face::MirrorEven {
+            Promise::new("Conservation", "mass of heat between even mirrors, PSE").at_most(1e-14, drift);
+        } else {
+            assert!(drift >= 1e-14, "{drift}");
+        }
     }
     Ok(())
 }

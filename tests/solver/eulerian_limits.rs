@@ -6,7 +6,7 @@ use parops::{
     AdvectionDiffusion, Apply, Boundary, CellList, CsrMatrix, Cutoff, DcPse, Domain, ErrorKind, Euler, Eulerian,
     Gradient, GrowthPolicy, ImplicitScheme, Laplacian, Limit, Limits, Method, Nearest, Neighbors, Particles, Pse, Rate,
     Result, Rk4, Rkl2, RowReport, Scene, SemiDiscrete, Sign, SolverError, SspRk3, Stabilized, Steady, Stencil,
-    TimeError, Transport, UpwindDcPse, UpwindGradient,
+    TimeError, Transport, UpwindDcPse, UpwindGradient, testing::Promise,
 };
 
 fn torus() -> Result<Domain<2>> {
@@ -32,8 +32,9 @@ fn growing() -> DcPse<Gradient<2>, 2> {
     DcPse::new().sign(Sign::Minus)
 }
 
-fn is_growing(error: &parops::Error) -> bool {
-    matches!(error.kind(), ErrorKind::Solver(SolverError::Growing { .. }))
+fn refused_for_growth(error: &parops::Error) {
+    let growing = matches!(error.kind(), ErrorKind::Solver(SolverError::Growing { .. }));
+    Promise::new("Limits of steps", "scenes with modes that grow are refused by default").case(error).holds(growing);
 }
 
 #[test]
@@ -62,9 +63,10 @@ fn flow_at_rest_when_rows_are_made_is_estimated_once_it_moves() -> Result<()> {
     let mut u = vec![1.0; set.len()];
     let mut run = Eulerian::new(scene(), &set, &neighbors, Rk4::new())?;
     let error = run.step(&mut u, 1e-3).err().unwrap();
-    assert!(is_growing(&error) && run.time() == 0.0 && run.ledger().step == 0, "{error}");
+    refused_for_growth(&error);
+    assert!(run.time() == 0.0 && run.ledger().step == 0, "{error}");
     let mut later = Eulerian::new(scene(), &set, &neighbors, Rk4::new())?.at(1.0);
-    assert!(is_growing(&later.step(&mut u, 1e-3).err().unwrap()));
+    refused_for_growth(&later.step(&mut u, 1e-3).err().unwrap());
     // Allowed, it is recorded, and again as the flow gets faster.
     let (steps, growth) = (parops::StepPolicy::Refuse, GrowthPolicy::Allow);
     let mut run = Eulerian::with_policy(scene(), &set, &neighbors, Rk4::new(), steps, growth)?;
@@ -118,7 +120,9 @@ fn source_that_turns_fields_into_each_other_binds_by_the_imaginary_interval() ->
     for _ in 0..500 {
         run.step(&mut u, dt)?;
     }
-    assert!(u.iter().all(|u| u[0].hypot(u[1]) <= 1.0 + 1e-12));
+    let size = u.iter().map(|u| u[0].hypot(u[1])).fold(0.0, f64::max);
+    Promise::new("Limits of steps", "size after 500 steps at the limit of a source that turns fields, less 1")
+        .at_most(1e-12, size - 1.0);
     // Euler has no such interval: there a source that only decays binds as on the real axis.
     let fall = |_: &[f64; 1], _: f64, u: [f64; 2]| [-OMEGA * u[0], OMEGA * u[0]];
     let scene = AdvectionDiffusion::<1>::new().fields::<[f64; 2]>().source(fall);
@@ -198,7 +202,7 @@ fn slow_growth_amid_the_imaginary_axis_is_refused() -> Result<()> {
         let (set, neighbors) = scattered(n, 0.3, 26)?;
         let rows = DcPse::<Gradient<2>, 2>::new().sign(Sign::Plus);
         let scene = AdvectionDiffusion::<2>::new().advection([1.0, 0.0], rows);
-        assert!(is_growing(&Eulerian::new(scene, &set, &neighbors, Rk4::new()).err().unwrap()));
+        refused_for_growth(&Eulerian::new(scene, &set, &neighbors, Rk4::new()).err().unwrap());
     }
     // On a lattice the same rows turn waves and nothing else.
     let lattice = Particles::lattice([0.0; 2], [1.0; 2], [16; 2])?;
@@ -213,7 +217,7 @@ fn slow_growth_amid_the_imaginary_axis_is_refused() -> Result<()> {
 fn foreign_rows_that_grow_are_found_whatever_their_report_says() -> Result<()> {
     let (set, neighbors) = ring(64)?;
     let scene = AdvectionDiffusion::<1>::new().diffusion(1.0, Backward);
-    assert!(is_growing(&Eulerian::new(scene, &set, &neighbors, Rk4::new()).err().unwrap()));
+    refused_for_growth(&Eulerian::new(scene, &set, &neighbors, Rk4::new()).err().unwrap());
     Ok(())
 }
 
@@ -235,7 +239,9 @@ fn crank_nicolson_takes_inflow_where_the_step_ends() -> Result<()> {
         }
         // One is a solution; each solve is good to 1e-13 of a condition below 100.
         let worst = u.iter().map(|u| (u - 1.0).abs()).fold(0.0, f64::max);
-        assert!(worst < 1e-11, "{start} {worst}");
+        Promise::new("Accuracy", "a constant fed by inflow from either end of a flow that turns, Crank-Nicolson")
+            .case(start)
+            .at_most(1e-11, worst);
     }
     Ok(())
 }
@@ -264,12 +270,13 @@ fn matrix_of_a_scene_is_its_rate() -> Result<()> {
             .divergence(|x: &[f64; 2], t: f64| x[0] * t)
     }
     let h = set.spacing()?;
-    assert!(apart(scene(DcPse::<Gradient<2>, 2>::new()), &set, &neighbors)? < ROUNDING);
-    assert!(apart(scene(UpwindDcPse::half_stencils()), &set, &neighbors)? < ROUNDING);
-    assert!(apart(scene(Stabilized::<2, 2>::new(h).gamma(0.2)), &set, &neighbors)? < ROUNDING);
+    let agrees = Promise::new("Residuals", "the matrix of a scene against its rate, relative");
+    agrees.at_most(ROUNDING, apart(scene(DcPse::<Gradient<2>, 2>::new()), &set, &neighbors)?);
+    agrees.at_most(ROUNDING, apart(scene(UpwindDcPse::half_stencils()), &set, &neighbors)?);
+    agrees.at_most(ROUNDING, apart(scene(Stabilized::<2, 2>::new(h).gamma(0.2)), &set, &neighbors)?);
     let upwind = UpwindGradient::new(h.epsilon(1.0)?, set.volumes()?).support(3.0)?;
     let near = CellList::build(&set, &torus()?, upwind.cutoff())?;
-    assert!(apart(scene(upwind), &set, &near)? < ROUNDING);
+    agrees.at_most(ROUNDING, apart(scene(upwind), &set, &near)?);
     Ok(())
 }
 
@@ -280,7 +287,8 @@ fn rate_that_is_no_number_allows_no_step() {
         limits.add(Limit::Diffusion, Rate::decay(1.0));
         limits.add(Limit::Advection, rate);
         let rk4 = Rk4::<f64>::new();
-        assert!(!(limits.step(&rk4) > 0.0) && limits.check(1e-3, &rk4).is_err(), "{rate:?}");
+        let none = !(limits.step(&rk4) > 0.0) && limits.check(1e-3, &rk4).is_err();
+        Promise::new("Limits of steps", "rates that are no numbers allow no step").holds(none);
         assert_eq!(limits.binding(&rk4), Some(Limit::Advection));
     }
 }

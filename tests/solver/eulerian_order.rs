@@ -10,7 +10,9 @@ use parops::{
 
 /// The observed order may miss the design order by this on periodic sets.
 const PERIODIC: f64 = 0.1;
-/// It may be this much lower where there are boundaries.
+/// It may be this much lower where there are boundaries. There truncation errors of order r, whose factors are larger as
+/// stencils are wider by as much as twice, act on a layer of some h, and values at walls miss by order r + 1: together an
+/// error of order r + 1 beside that of order r from within, so that orders are between r and r + 1.
 const BOUNDED: f64 = 0.3;
 const D0: f64 = 0.05;
 
@@ -247,12 +249,18 @@ fn bounded<const D: usize, const R: u32>(
     Ok(order(&errors))
 }
 
+/// Between r and r + 1.
+fn within(text: &'static str, r: f64, found: f64) {
+    println!("{text}: {found:.3}");
+    promised(text).within(r - BOUNDED, r + 1.0 + PERIODIC, found);
+}
+
 #[test]
 fn dcpse_keeps_its_order_in_a_box_with_boundary_rows() -> Result<()> {
     let second = bounded::<2, 2>([16, 23, 32, 45], 20, square)?;
     let fourth = bounded::<2, 4>([16, 23, 32, 45], 44, square)?;
-    promised("Eulerian runs in a box with boundary rows, r = 2").at_least(2.0 - BOUNDED, second);
-    promised("Eulerian runs in a box with boundary rows, r = 4").at_least(4.0 - BOUNDED, fourth);
+    within("Eulerian runs in a box with boundary rows, r = 2", 2.0, second);
+    within("Eulerian runs in a box with boundary rows, r = 4", 4.0, fourth);
     Ok(())
 }
 
@@ -260,8 +268,8 @@ fn dcpse_keeps_its_order_in_a_box_with_boundary_rows() -> Result<()> {
 fn dcpse_keeps_its_order_in_a_disc() -> Result<()> {
     let second = bounded::<2, 2>([16, 23, 32, 45], 20, disc)?;
     let fourth = bounded::<2, 4>([16, 23, 32, 45], 44, disc)?;
-    promised("Eulerian runs in a disc with boundary rows, r = 2").at_least(2.0 - BOUNDED, second);
-    promised("Eulerian runs in a disc with boundary rows, r = 4").at_least(4.0 - BOUNDED, fourth);
+    within("Eulerian runs in a disc with boundary rows, r = 2", 2.0, second);
+    within("Eulerian runs in a disc with boundary rows, r = 4", 4.0, fourth);
     Ok(())
 }
 
@@ -269,7 +277,7 @@ fn dcpse_keeps_its_order_in_a_disc() -> Result<()> {
 fn dcpse_keeps_its_order_in_a_ball() -> Result<()> {
     let second = bounded::<3, 2>([10, 13, 17, 22], 44, ball)?;
     let fourth = bounded::<3, 4>([11, 13, 16, 19], 120, ball)?;
-    promised("Eulerian runs in a ball with boundary rows, r = 2").at_least(2.0 - BOUNDED, second);
-    promised("Eulerian runs in a ball with boundary rows, r = 4").at_least(4.0 - BOUNDED, fourth);
+    within("Eulerian runs in a ball with boundary rows, r = 2", 2.0, second);
+    within("Eulerian runs in a ball with boundary rows, r = 4", 4.0, fourth);
     Ok(())
 }

@@ -118,11 +118,11 @@ fn miss<St: Stepper<MovingState<2, f64>>>(stepper: impl Fn() -> St, dt: f64) -> 
 
 #[test]
 fn flow_turned_round_takes_particles_back_at_the_order_of_the_stepper() -> Result<()> {
-    // The errors of an even order cancel on the way back but for the next order.
+    // The errors of an even order cancel on the way back but for the next order: 5 for RK4.
     let order = |a: f64, b: f64| (a / b).log2();
     let (a, b) = (miss(Rk4::new, 0.05)?, miss(Rk4::new, 0.025)?);
     let back = |text| Promise::new("Metamorphic relations", text);
-    back("M13 order at which particles come back, RK4").within(3.7, 5.5, order(a, b));
+    back("M13 order at which particles come back, RK4").within(4.7, 5.3, order(a, b));
     let (a, b) = (miss(SspRk3::new, 0.05)?, miss(SspRk3::new, 0.025)?);
     back("M13 order at which particles come back, SSP-RK3").within(2.7, 3.5, order(a, b));
     let (a, b) = (miss(Euler::new, 0.01)?, miss(Euler::new, 0.005)?);
@@ -198,7 +198,8 @@ fn dcpse_diffuses_on_a_distorted_set_without_remeshing_at_its_order() -> Result<
     let order = (a / b).log2();
     println!("errors {a:e} {b:e}, order {order}, drift {drift:e}");
     assert!(b < 0.02, "{a:e} {b:e}");
-    Promise::new("Orders", "DC-PSE diffusion on a distorted set, r = 2").within(1.6, 2.9, order);
+    // Of the largest error: the band of L-inf orders on scattered sets.
+    Promise::new("Orders", "DC-PSE diffusion on a distorted set, r = 2").within(1.65, 2.5, order);
     // Rows that are not symmetric do not conserve, and the ledger says so.
     assert!(drift > 1e-12);
     Ok(())

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use parops::{
     AdvectionDiffusion, Carried, CellList, DcPse, Domain, ErrorKind, Euler, Eulerian, Lagrangian, Lambda, Laplacian,
     Limit, Mesh, MovingScene, Nearest, OverlapWatch, Particles, Remeshing, Rk4, SolverError, Steady, Trigger,
+    testing::Promise,
 };
 
 fn torus() -> Domain<2> {
@@ -55,7 +56,8 @@ fn watched_run_refuses_lost_overlap_and_is_what_it_was_before_the_step() {
         panic!("{error}")
     };
     assert!((most, least) == (1.2, 0.4) && (hole > most || gap < least));
-    assert!(rows > 2 && run.points() == points && run.ledger().step == rows);
+    let kept = run.points() == points && run.ledger().step == rows;
+    Promise::new("Input", "watched runs refuse lost overlap and stay as before the step").holds(rows > 2 && kept);
 }
 
 #[test]
@@ -116,8 +118,9 @@ fn drift_above_its_budget_is_refused_and_the_field_kept() {
     let ErrorKind::Solver(SolverError::Drift { field: 0, drift, size, budget: limit }) = *error.kind() else {
         panic!("{error}")
     };
-    assert!(drift.abs() > budget * size && limit == budget && field == before);
-    assert_eq!(bounded.ledger().step as usize, steps);
+    let kept = drift.abs() > budget * size && limit == budget && field == before;
+    Promise::new("Input", "steps that drift above their budget are refused and leave the field")
+        .holds(kept && bounded.ledger().step as usize == steps);
 
     // What conserves keeps to any budget that rounding allows.
     let lattice = Particles::lattice([0.0; 2], [1.0; 2], [24; 2]).unwrap();
