@@ -38,6 +38,34 @@ fn text_shows_the_numbers_and_the_particle_if_there_is_one() {
 }
 
 #[test]
+fn text_is_short_however_large_or_small_its_numbers_are() {
+    for (value, text) in [
+        (0.0, "0"),
+        (-0.25, "-0.25"),
+        (1e-5, "0.00001"),
+        (9.9e-6, "9.9e-6"),
+        (1.09e-60, "1.09e-60"),
+        (1e15, "1000000000000000"),
+        (-1e16, "-1e16"),
+        (1e100, "1e100"),
+        (f64::MIN_POSITIVE, "2.2250738585072014e-308"),
+        (f64::INFINITY, "inf"),
+        (f64::NAN, "NaN"),
+    ] {
+        let error = Error::from(NeighborError::Skin { skin: value });
+        assert_eq!(error.to_string(), format!("skin {text} is not a finite number from 0 on"));
+        let hinted = Error::user(1).wanting(value).to_string();
+        assert!(hinted.ends_with(&format!("; a provider built with the cutoff {text} may serve")), "{hinted}");
+    }
+    // Two numbers of a hundred digits were 200 characters.
+    let faces = Error::from(DomainError::Faces { axis: 0, lower: f64::MAX, upper: -f64::MAX });
+    assert!(faces.to_string().len() < 120, "{faces}");
+    // What has a format of its own keeps it.
+    let range = NeighborError::CutoffRange { cutoff: 1e-70, low: 0.5, high: 2.0 }.to_string();
+    assert_eq!(range, "cutoff 1e-70 is outside 5e-1 to 2e0");
+}
+
+#[test]
 fn user_code_comes_back_unchanged() {
     for code in [0, i64::MIN, i64::MAX] {
         assert_eq!(*Error::user(code).kind(), ErrorKind::User { code });

@@ -9,6 +9,7 @@ mod linear;
 mod mesh;
 mod multi_index;
 mod neighbor;
+mod number;
 mod operator;
 mod particle;
 mod report;
@@ -32,6 +33,8 @@ pub use time::TimeError;
 
 use std::fmt;
 
+use number::Shown;
+
 /// Declares an enum of error kinds together with the sentence each variant is shown as.
 macro_rules! kinds {
     ($(#[$doc:meta])* $name:ident { $( $(#[$vdoc:meta])* $variant:ident { $( $(#[$fdoc:meta])* $field:ident : $ty:ty ),* $(,)? } => $text:literal, )* }) => {
@@ -42,7 +45,10 @@ macro_rules! kinds {
 
         impl std::fmt::Display for $name {
             fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                match self { $( $name::$variant { $( $field ),* } => write!(f, $text), )* }
+                match self { $( $name::$variant { $( $field ),* } => {
+                    $( let $field = $crate::error::number::Shown::shown(*$field); )*
+                    write!(f, $text)
+                } )* }
             }
         }
     };
@@ -117,7 +123,7 @@ impl fmt::Display for Error {
         }
         self.kind.fmt(f)?;
         match self.wanted_cutoff {
-            Some(cutoff) => write!(f, "; a provider built with the cutoff {cutoff} may serve"),
+            Some(cutoff) => write!(f, "; a provider built with the cutoff {} may serve", cutoff.shown()),
             None => Ok(()),
         }
     }
