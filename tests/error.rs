@@ -1,8 +1,8 @@
 //! Errors carry a kind, the particle concerned and the numbers; their text shows all three.
 
 use parops::{
-    ApplyError, DomainError, Epsilon, Error, ErrorKind, KernelError, MultiIndexError, NeighborError, OperatorError,
-    ParticleError, Result, TimeError, Volumes,
+    ApplyError, CellList, Cutoff, DcPse, Domain, DomainError, Epsilon, Error, ErrorKind, KernelError, Laplacian,
+    MultiIndexError, NeighborError, OperatorError, ParticleError, Particles, Result, TimeError, UpwindDcPse, Volumes,
 };
 
 /// One kind of every layer, with numbers that its sentence must show.
@@ -93,4 +93,36 @@ fn first_bad_entry_of_an_array_is_named() {
         }
         assert_eq!(refuse(vec![f64::MIN_POSITIVE, f64::MAX]), Ok(()));
     }
+}
+
+#[test]
+fn a_set_too_small_for_any_cutoff_is_told_apart_from_a_short_cutoff() {
+    let dcpse = DcPse::<Laplacian<2>, 2>::new();
+    let needed = dcpse.fewest_neighbors().unwrap();
+    let refusal = |set: &Particles<2>, domain: &Domain<2>, cutoff: f64| {
+        let cells = CellList::build(set, domain, Cutoff(cutoff)).unwrap();
+        let refused = dcpse.assemble(&cells).unwrap_err();
+        let few = matches!(refused.kind(), ErrorKind::Operator(OperatorError::TooFew { .. }));
+        assert!(few && refused.particle().is_some(), "{refused}");
+        refused
+    };
+    for n in 1..=needed {
+        let set = Particles::random([0.0; 2], [1.0; 2], n, 7).unwrap();
+        let refused = refusal(&set, &Domain::open(), 10.0);
+        assert_eq!(refused.wanted_cutoff(), None, "{refused}");
+        let says = format!("; the whole set has {n} particles, at least {} are needed", needed + 1);
+        assert!(refused.to_string().ends_with(&says), "{refused}");
+        // Behind periodic faces there are images, which a wider cutoff may reach.
+        let torus = Domain::periodic([0.0; 2], [1.0; 2]).unwrap();
+        assert!(refusal(&set, &torus, 0.01).wanted_cutoff().is_some());
+    }
+    let enough = Particles::random([0.0; 2], [1.0; 2], needed + 1, 7).unwrap();
+    let short = refusal(&enough, &Domain::open(), 0.01);
+    assert!(short.wanted_cutoff().is_some() && !short.to_string().contains("whole set"), "{short}");
+    // Under another name the hint stays.
+    let three = Particles::random([0.0; 2], [1.0; 2], 3, 7).unwrap();
+    let around = CellList::build(&three, &Domain::open(), Cutoff(10.0)).unwrap();
+    let thin = UpwindDcPse::half_stencils().assemble(&around).unwrap_err();
+    assert!(matches!(thin.kind(), ErrorKind::Operator(OperatorError::ThinSide { .. })), "{thin}");
+    assert!(thin.to_string().contains("; the whole set has 3 particles"), "{thin}");
 }
