@@ -2,7 +2,8 @@
 
 use parops::{
     ApplyError, CellList, Cutoff, DcPse, Domain, DomainError, Epsilon, Error, ErrorKind, KernelError, Laplacian,
-    MultiIndexError, NeighborError, OperatorError, ParticleError, Particles, Result, TimeError, UpwindDcPse, Volumes,
+    MultiIndexError, NeighborError, OperatorError, ParticleError, Particles, Result, Side, Spacing, TimeError,
+    Upstream, UpwindDcPse, Volumes,
 };
 
 /// One kind of every layer, with numbers that its sentence must show.
@@ -125,4 +126,16 @@ fn a_set_too_small_for_any_cutoff_is_told_apart_from_a_short_cutoff() {
     let thin = UpwindDcPse::half_stencils().assemble(&around).unwrap_err();
     assert!(matches!(thin.kind(), ErrorKind::Operator(OperatorError::ThinSide { .. })), "{thin}");
     assert!(thin.to_string().contains("; the whole set has 3 particles"), "{thin}");
+}
+
+#[test]
+fn an_axis_that_does_not_exist_is_refused() {
+    let set = Particles::lattice([0.0; 2], [1.0; 2], [4; 2]).unwrap();
+    let around = CellList::build(&set, &Domain::open(), Cutoff(0.4)).unwrap();
+    for axis in [0, 1, 2, 7, usize::MAX] {
+        let half = Upstream::half(&around, axis, Side::Left, 3).map(drop);
+        let biased = Upstream::biased(&around, axis, Side::Right, Spacing(0.25), 3).map(drop);
+        let expected = if axis < 2 { Ok(()) } else { Err(NeighborError::Axis { axis, axes: 2 }.into()) };
+        assert_eq!((&half, &biased), (&expected, &expected));
+    }
 }
