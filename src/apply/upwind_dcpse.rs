@@ -121,8 +121,5 @@ fn named(error: Error, axis: usize, side: Side) -> Error {
     else {
         return error;
     };
-    let (particle, cutoff) = (error.particle(), error.wanted_cutoff());
-    let named = Error::from(OperatorError::ThinSide { axis, side, neighbors, conditions });
-    let named = particle.into_iter().fold(named, Error::at);
-    cutoff.into_iter().fold(named, Error::wanting)
+    error.renamed(OperatorError::ThinSide { axis, side, neighbors, conditions })
 }

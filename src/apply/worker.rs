@@ -4,7 +4,8 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::error::{Error, NeighborError, OperatorError, Result};
+use crate::domain::Face;
+use crate::error::{Error, ErrorKind, NeighborError, OperatorError, Result};
 use crate::neighbors::Neighbors;
 use crate::operator::{Draft, GROWTH, Method, Outputs, RowReport};
 use crate::stencil::Stencil;
@@ -191,7 +192,23 @@ fn mend<const D: usize, M: Method<D>, P: Neighbors<D>>(
             report.grown = grown;
             Ok(())
         }
-        Err(refusal) if method.can_grow(refusal) && !limited => Err(refusal.clone().wanting(wanted).at(p)),
-        Err(refusal) => Err(refusal.clone().at(p)),
+        Err(refusal) => {
+            let refusal = refusal.clone().at(p);
+            Err(match lack(neighbors, &draft.stencil, &refusal) {
+                Some((found, needed)) => refusal.lacking(found, needed),
+                None if method.can_grow(&refusal) && !limited => refusal.wanting(wanted),
+                None => refusal,
+            })
+        }
     }
+}
+
+/// How many sources there are and how many are needed at least, where a row has too few neighbors at any cutoff.
+fn lack<const D: usize>(neighbors: &impl Neighbors<D>, row: &Stencil<D>, refusal: &Error) -> Option<(usize, usize)> {
+    let ErrorKind::Operator(OperatorError::TooFew { needed, .. }) = *refusal.kind() else { return None };
+    let (faces, found) = (neighbors.domain()?.faces(), neighbors.sources());
+    // Behind faces there are images: more neighbors than particles.
+    let alone = faces.iter().flatten().all(|face| *face == Face::Open);
+    let needed = needed + usize::from(row.center().is_some());
+    (alone && found < needed).then_some((found, needed))
 }

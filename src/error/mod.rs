@@ -9,6 +9,7 @@ mod linear;
 mod mesh;
 mod multi_index;
 mod neighbor;
+mod number;
 mod operator;
 mod particle;
 mod report;
@@ -32,6 +33,8 @@ pub use time::TimeError;
 
 use std::fmt;
 
+use number::Shown;
+
 /// Declares an enum of error kinds together with the sentence each variant is shown as.
 macro_rules! kinds {
     ($(#[$doc:meta])* $name:ident { $( $(#[$vdoc:meta])* $variant:ident { $( $(#[$fdoc:meta])* $field:ident : $ty:ty ),* $(,)? } => $text:literal, )* }) => {
@@ -42,7 +45,10 @@ macro_rules! kinds {
 
         impl std::fmt::Display for $name {
             fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                match self { $( $name::$variant { $( $field ),* } => write!(f, $text), )* }
+                match self { $( $name::$variant { $( $field ),* } => {
+                    $( let $field = $crate::error::number::Shown::shown(*$field); )*
+                    write!(f, $text)
+                } )* }
             }
         }
     };
@@ -64,13 +70,22 @@ pub type Result<T> = std::result::Result<T, Error>;
 pub struct Error {
     kind: ErrorKind,
     particle: Option<usize>,
-    wanted_cutoff: Option<f64>,
+    remedy: Option<Remedy>,
+}
+
+/// What may help.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Remedy {
+    /// A provider built with this cutoff.
+    Cutoff(f64),
+    /// Nothing but more particles: there are `found`, and at least `needed` are needed.
+    Particles { found: usize, needed: usize },
 }
 
 impl Error {
     /// An error of the given kind that concerns no particle in particular.
     pub fn new(kind: impl Into<ErrorKind>) -> Self {
-        Self { kind: kind.into(), particle: None, wanted_cutoff: None }
+        Self { kind: kind.into(), particle: None, remedy: None }
     }
 
     /// An error of the user's own, for right-hand sides, providers and methods outside this crate.
@@ -90,8 +105,19 @@ impl Error {
     /// Names the cutoff a neighbor provider should be built with before the call is tried again.
     #[must_use]
     pub fn wanting(mut self, cutoff: f64) -> Self {
-        self.wanted_cutoff = Some(cutoff);
+        self.remedy = Some(Remedy::Cutoff(cutoff));
         self
+    }
+
+    /// Says that the whole set of `found` particles is too small, whatever the cutoff.
+    pub(crate) fn lacking(mut self, found: usize, needed: usize) -> Self {
+        self.remedy = Some(Remedy::Particles { found, needed });
+        self
+    }
+
+    /// The same refusal under another name.
+    pub(crate) fn renamed(self, kind: impl Into<ErrorKind>) -> Self {
+        Self { kind: kind.into(), ..self }
     }
 
     /// What went wrong, with its numbers.
@@ -106,7 +132,10 @@ impl Error {
 
     /// The cutoff to build the neighbor provider with, where a wider one may help.
     pub fn wanted_cutoff(&self) -> Option<f64> {
-        self.wanted_cutoff
+        match self.remedy {
+            Some(Remedy::Cutoff(cutoff)) => Some(cutoff),
+            _ => None,
+        }
     }
 }
 
@@ -116,8 +145,13 @@ impl fmt::Display for Error {
             write!(f, "particle {particle}: ")?;
         }
         self.kind.fmt(f)?;
-        match self.wanted_cutoff {
-            Some(cutoff) => write!(f, "; a provider built with the cutoff {cutoff} may serve"),
+        match self.remedy {
+            Some(Remedy::Particles { found, needed }) => {
+                write!(f, "; the whole set has {found} particles, at least {needed} are needed")
+            }
+            Some(Remedy::Cutoff(cutoff)) => {
+                write!(f, "; a provider built with the cutoff {} may serve", cutoff.shown())
+            }
             None => Ok(()),
         }
     }

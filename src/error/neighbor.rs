@@ -64,6 +64,13 @@ kinds! {
             /// Largest legal number.
             limit: f64,
         } => "axis {axis}: {cells:e} cells are more than {limit:e}",
+        /// An axis that does not exist.
+        Axis {
+            /// The axis named.
+            axis: usize,
+            /// Number of axes D.
+            axes: usize,
+        } => "there is no axis {axis} among {axes}",
         /// Row offsets of a list that do not describe its rows.
         Offsets {
             /// Row at which they fail.

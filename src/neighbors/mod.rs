@@ -15,6 +15,7 @@ mod order;
 mod overlap;
 mod pair;
 mod placed;
+mod probes;
 mod quality;
 mod reflected;
 mod row_check;

@@ -37,29 +37,42 @@ pub fn least_gap<const D: usize>(provider: &impl Neighbors<D>) -> f64 {
 ///
 /// Source: Wendland 2004, def. 1.4 (fill distance). Up to 6 dimensions.
 pub fn fill_distance<const D: usize>(provider: &impl Neighbors<D>) -> f64 {
+    let seen = (0..provider.targets()).map(|p| nearest(provider, p));
+    seen.filter(|seen| seen.surrounded).fold(0.0, |hole, seen| seen.distance.max(hole))
+}
+
+/// What a probe sees within the cutoff.
+pub(super) struct Seen {
+    /// To the nearest source; infinite where there is none.
+    pub distance: f64,
+    /// That source.
+    pub q: Option<usize>,
+    /// Whether every orthant holds a source.
+    pub surrounded: bool,
+}
+
+/// The nearest source of target p.
+pub(super) fn nearest<const D: usize>(provider: &impl Neighbors<D>, p: usize) -> Seen {
     const { assert!(D <= 6, "holes are measured in at most 6 dimensions") };
-    let mut hole = 0.0_f64;
-    for p in 0..provider.targets() {
-        // A bit for every orthant that holds no source; a source between two serves both.
-        let (mut square, mut empty) = (f64::INFINITY, if D == 6 { u64::MAX } else { (1 << (1_u64 << D)) - 1 });
-        provider.for_each(p, provider.cutoff(p), |neighbor| {
-            let z = &neighbor.separation;
-            square = square.min(squared(z));
-            if empty == 0 {
-                return;
-            }
-            for orthant in 0..1_u64 << D {
-                let holds = |(axis, &z): (usize, &f64)| if orthant >> axis & 1 == 1 { z >= 0.0 } else { z <= 0.0 };
-                if z.iter().enumerate().all(holds) {
-                    empty &= !(1 << orthant);
-                }
-            }
-        });
-        if empty == 0 {
-            hole = hole.max(square.sqrt());
+    // A bit for every orthant that holds no source; a source between two serves both.
+    let (mut square, mut empty) = (f64::INFINITY, if D == 6 { u64::MAX } else { (1 << (1_u64 << D)) - 1 });
+    let mut nearest = None;
+    provider.for_each(p, provider.cutoff(p), |neighbor| {
+        let z = &neighbor.separation;
+        if squared(z) < square {
+            (square, nearest) = (squared(z), Some(neighbor.q));
         }
-    }
-    hole
+        if empty == 0 {
+            return;
+        }
+        for orthant in 0..1_u64 << D {
+            let holds = |(axis, &z): (usize, &f64)| if orthant >> axis & 1 == 1 { z >= 0.0 } else { z <= 0.0 };
+            if z.iter().enumerate().all(holds) {
+                empty &= !(1 << orthant);
+            }
+        }
+    });
+    Seen { distance: square.sqrt(), q: nearest, surrounded: empty == 0 }
 }
 
 fn squared<const D: usize>(z: &[f64; D]) -> f64 {

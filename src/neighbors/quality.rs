@@ -1,6 +1,8 @@
 //! How good a particle set is, in a few numbers.
 
-use super::{CellList, Neighbors, fill_distance};
+use super::overlap::nearest;
+use super::probes::probes;
+use super::{CellList, Neighbors};
 use crate::domain::{Domain, Face};
 use crate::error::Result;
 use crate::particles::{Particles, reserved};
@@ -36,9 +38,12 @@ pub struct SetQuality {
     pub separation: f64,
     /// A particle at that gap.
     pub closest: Option<usize>,
-    /// The largest hole, see [`fill_distance`], seen from a lattice of about two probes a particle; infinite where a probe
-    /// of a domain without open faces has nobody within the cutoff.
+    /// The largest hole, as [`fill_distance`](crate::fill_distance) measures it from about two probes a particle, which lie
+    /// where particles are within the cutoff of each other: one far away changes nothing. Infinite where a probe of a domain without open faces has nobody within the
+    /// cutoff, and where no probe has particles all around it.
     pub fill: f64,
+    /// The particle nearest to the middle of that hole; `None` where it is infinite.
+    pub rim: Option<usize>,
     /// Fewest neighbors.
     pub fewest: usize,
     /// A particle with so few.
@@ -64,10 +69,12 @@ impl SetQuality {
     /// As [`CellList::build`]; [`ParticleError::Memory`](crate::ParticleError::Memory) where the probes do not fit.
     pub fn measure<const D: usize>(particles: &Particles<D>, domain: &Domain<D>, cutoff: Cutoff) -> Result<Self> {
         let cells = CellList::build(particles, domain, cutoff)?;
+        let (fill, rim) = fill(particles, domain, cutoff)?;
         let mut quality = Self {
             separation: f64::INFINITY,
             closest: None,
-            fill: fill(particles, domain, cutoff)?,
+            fill,
+            rim,
             fewest: usize::MAX,
             loneliest: None,
             median: 0,
@@ -123,61 +130,18 @@ fn volume_defect<const D: usize>(particles: &Particles<D>, domain: &Domain<D>) -
     whole.is_finite().then(|| sum / whole - 1.0)
 }
 
-/// The largest hole seen from the centers and the corners of about N cells.
-fn fill<const D: usize>(particles: &Particles<D>, domain: &Domain<D>, cutoff: Cutoff) -> Result<f64> {
-    let Some(first) = particles.points().first() else { return Ok(0.0) };
-    let closed = (0..D).all(|axis| domain.faces()[axis].iter().all(|face| *face != Face::Open));
-    let (mut low, mut high) = (*first, *first);
-    for x in particles.points() {
-        for axis in 0..D {
-            (low[axis], high[axis]) = (low[axis].min(x[axis]), high[axis].max(x[axis]));
-        }
-    }
-    if closed {
-        (low, high) = (domain.lower(), domain.upper());
-    }
-    let widths: [f64; D] = std::array::from_fn(|axis| high[axis] - low[axis]);
-    let counts = cells_of(widths, particles.len());
-    let total = counts.iter().product::<usize>();
-    let mut probes = reserved(2 * total)?;
-    for cell in 0..total {
-        let mut rest = cell;
-        let index = counts.map(|count| {
-            let i = rest % count;
-            rest /= count;
-            i as f64
-        });
-        for shift in [0.0, 0.5] {
-            let at = |axis: usize| low[axis] + widths[axis] * (index[axis] + shift) / counts[axis] as f64;
-            probes.push(std::array::from_fn(at));
-        }
-    }
+/// The largest hole seen from the probes, and the particle nearest to its middle.
+fn fill<const D: usize>(particles: &Particles<D>, domain: &Domain<D>, cutoff: Cutoff) -> Result<(f64, Option<usize>)> {
+    let probes = probes(particles.points(), domain, cutoff)?;
     let around = CellList::build_at(&probes, particles, domain, cutoff)?;
-    if !closed {
-        return Ok(fill_distance(&around));
-    }
-    let mut hole = 0.0_f64;
+    let closed = domain.faces().iter().flatten().all(|face| *face != Face::Open);
+    let (mut hole, mut rim) = (0.0_f64, None);
     for p in 0..probes.len() {
-        let mut square = f64::INFINITY;
-        around.for_each(p, cutoff.0, |q| square = square.min(q.separation.iter().map(|s| s * s).sum()));
-        hole = hole.max(square.sqrt());
+        let seen = nearest(&around, p);
+        if (closed || seen.surrounded) && seen.distance > hole {
+            (hole, rim) = (seen.distance, seen.q);
+        }
     }
-    Ok(hole)
-}
-
-/// Cells along the axes of a box, about `count` in all and as cubic as can be; one across an axis without extent.
-fn cells_of<const D: usize>(widths: [f64; D], count: usize) -> [usize; D] {
-    let mut cells = [1; D];
-    let mut axes: Vec<usize> = (0..D).filter(|&axis| widths[axis] > 0.0).collect();
-    // The narrowest first: what it cannot take is left to the others.
-    axes.sort_by(|&a, &b| widths[a].total_cmp(&widths[b]));
-    let mut left = count.max(1) as f64;
-    for (i, &axis) in axes.iter().enumerate() {
-        let rest = (axes.len() - i) as f64;
-        let mean = axes[i..].iter().map(|&axis| widths[axis].ln()).sum::<f64>() / rest;
-        let share = (widths[axis].ln() - mean).exp() * left.powf(1.0 / rest);
-        cells[axis] = (share.round() as usize).clamp(1, count.max(1));
-        left = (left / cells[axis] as f64).max(1.0);
-    }
-    cells
+    // A probe on a particle has seen nothing.
+    Ok(if hole > 0.0 { (hole, rim) } else { (f64::INFINITY, None) })
 }

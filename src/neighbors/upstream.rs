@@ -3,7 +3,7 @@
 use super::Neighbors;
 use super::placed::{distance_squared, within};
 use crate::domain::Domain;
-use crate::error::Result;
+use crate::error::{NeighborError, Result};
 use crate::particles::reserved;
 use crate::scale::Spacing;
 use crate::stencil::{Neighbor, Side, Stencil};
@@ -41,7 +41,7 @@ impl<'a, P> Upstream<'a, P> {
     /// The k nearest neighbors on this side of the plane through the target.
     ///
     /// # Errors
-    /// [`ParticleError::Memory`](crate::ParticleError::Memory) where there is no room for a cutoff per target.
+    /// [`NeighborError::Axis`] for an axis that does not exist; [`ParticleError::Memory`](crate::ParticleError::Memory) where there is no room for a cutoff per target.
     pub fn half<const D: usize>(provider: &'a P, axis: usize, side: Side, k: usize) -> Result<Self>
     where
         P: Neighbors<D>,
@@ -64,6 +64,9 @@ impl<'a, P> Upstream<'a, P> {
     where
         P: Neighbors<D>,
     {
+        if axis >= D {
+            return Err(NeighborError::Axis { axis, axes: D }.into());
+        }
         let targets = provider.targets();
         let mut upstream = Self { provider, axis, side, shift, cutoffs: reserved(targets)? };
         let (mut distances, k) = (Vec::new(), k.max(1));

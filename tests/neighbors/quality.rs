@@ -72,6 +72,57 @@ fn fill_sees_a_hole_that_counts_do_not() {
 }
 
 #[test]
+fn fill_of_an_open_set_is_that_of_its_holes_whatever_lies_far_away() {
+    let (m, radius) = (40, 4.0);
+    let h = 1.0 / f64::from(m);
+    let mut points = Particles::lattice([0.0; 2], [1.0; 2], [m as usize; 2]).unwrap().points().to_vec();
+    points.retain(|x| (x[0] - 0.5).hypot(x[1] - 0.5) >= radius * h);
+    let to_middle = |x: &[f64; 2]| (x[0] - 0.5).hypot(x[1] - 0.5);
+    let hole = points.iter().map(to_middle).fold(f64::INFINITY, f64::min);
+    let measure = |points: Vec<[f64; 2]>, cutoff: f64| {
+        SetQuality::measure(&Particles::new(points).unwrap(), &Domain::open(), Cutoff(cutoff * h)).unwrap()
+    };
+    let alone = measure(points.clone(), 6.0);
+    // Probes are h apart, and a middle between four corners: half of it to the next.
+    assert!(alone.fill <= hole + EPS && alone.fill >= hole - 0.5 * h, "{} of {}", alone.fill / h, hole / h);
+    assert!((to_middle(&points[alone.rim.unwrap()]) - hole).abs() <= h, "the rim is not beside the hole");
+    for far in [2.0, 5.0, 100.0, 1e6, -1e9] {
+        let mut more = points.clone();
+        more.push([far; 2]);
+        let quality = measure(more, 6.0);
+        assert_eq!((quality.fill, quality.rim), (alone.fill, alone.rim), "with a particle at {far}");
+    }
+    // Two sets apart from each other: the gap between them is no hole, and the larger hole is found in either.
+    let mut pair = points.clone();
+    pair.extend(Particles::lattice([9.0; 2], [10.0; 2], [m as usize; 2]).unwrap().points());
+    assert_eq!(measure(pair, 6.0).fill, alone.fill);
+    // A cutoff far beyond the set sees it still.
+    let wide = measure(points.clone(), 1e3).fill;
+    assert!(wide <= hole + EPS && wide >= hole - 0.75 * h, "{} of {}", wide / h, hole / h);
+}
+
+#[test]
+fn fill_is_never_zero_where_nothing_was_probed() {
+    let measure = |points: &[[f64; 2]], cutoff: f64| {
+        SetQuality::measure(&Particles::new(points.to_vec()).unwrap(), &Domain::open(), Cutoff(cutoff)).unwrap()
+    };
+    let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+    let none: [&[[f64; 2]]; 4] = [&[], &corners[..1], &[[0.3; 2]; 5], &[[0.0, 0.0], [1.0, 1.0]]];
+    for points in none {
+        let quality = measure(points, 0.5);
+        assert_eq!((quality.fill, quality.rim), (f64::INFINITY, None), "{points:?}");
+    }
+    // All four are 0.71 away from the middle of the square, two are 0.5 away from that of a side.
+    assert_eq!(measure(&corners, 0.4).fill, f64::INFINITY);
+    let seen = measure(&corners, 1.5);
+    assert!((seen.fill - 0.5_f64.sqrt()).abs() <= EPS && seen.rim.is_some());
+    // On a line along an axis a hole is half a gap.
+    let line: Vec<[f64; 2]> = (0..30).filter(|i| !(10..13).contains(i)).map(|i| [0.1 * f64::from(i), 7.0]).collect();
+    let gap = measure(&line, 0.5);
+    assert!((0.15..=0.2 + EPS).contains(&gap.fill), "{}", gap.fill);
+}
+
+#[test]
 fn volume_defect_is_that_of_the_box_and_absent_without_one() {
     let set = Particles::jittered([0.0; 2], [1.0; 2], [10; 2], 0.3, 1).unwrap();
     let defect =
@@ -90,8 +141,8 @@ fn set_quality_answers_on_poor_sets_and_refuses_what_cells_refuse() {
         SetQuality::measure(&Particles::new(points).unwrap(), &Domain::open(), Cutoff(0.5)).unwrap()
     };
     let none = measure(Vec::new());
-    assert_eq!((none.fewest, none.median, none.most, none.fill, none.disorder), (0, 0, 0, 0.0, 0.0));
-    assert_eq!((none.separation, none.loneliest), (f64::INFINITY, None));
+    assert_eq!((none.fewest, none.median, none.most, none.disorder), (0, 0, 0, 0.0));
+    assert_eq!((none.separation, none.loneliest, none.fill), (f64::INFINITY, None, f64::INFINITY));
     let one = measure(vec![[1.0; 3]]);
     assert_eq!((one.most, one.separation, one.closest), (0, f64::INFINITY, None));
     let heap = measure(vec![[1.0; 3]; 5]);
