@@ -49,21 +49,14 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
         let oscillates = self.oscillates(t)?;
         let (mut field, mut rate) = (vec![S::Value::ZERO; count], vec![S::Value::ZERO; count]);
         // Values beyond the range of f32 never come up: the vectors of the search have unit length.
-        let mut apply = |u: &[f64], du: &mut [f64]| {
+        let apply = |u: &[f64], du: &mut [f64]| {
             free.iter().zip(u).for_each(|(&p, &u)| field[p].set(0, u));
             self.linear(t, &mut field, &mut rate)?;
             free.iter().zip(du).for_each(|(&p, du)| *du = rate[p].get(0));
             Ok(())
         };
         let estimator = SpectrumEstimator::new().subspace(if oscillates { VECTORS } else { 32 }).most(MOST);
-        if !oscillates && estimator.is_exact(free.len()) {
-            // Nothing crowds the imaginary axis: runs find the rightmost at a hundredth of the cost of all eigenvalues.
-            let found = estimator.dense(0).estimate(free.len(), &mut apply);
-            if found.as_ref().is_ok_and(|spectrum| spectrum.converged) {
-                return found;
-            }
-        }
-        estimator.estimate(free.len(), apply)
+        if oscillates { estimator.estimate(free.len(), apply) } else { estimator.settle(free.len(), apply) }
     }
 
     /// Whether an advection term puts eigenvalues along the imaginary axis.

@@ -336,7 +336,7 @@ fn spectrum<const D: usize, M: Method<D, Out = [f64; 1]>>(
     if rows.cannot_grow(legal::<f64>()) {
         return Ok(Spectrum::default());
     }
-    estimator.estimate(neighbors.targets(), |u, du| {
+    estimator.settle(neighbors.targets(), |u, du| {
         rows.apply(u, du)?;
         du.iter_mut().for_each(|du| *du *= factor);
         Ok(())
