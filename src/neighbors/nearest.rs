@@ -104,9 +104,10 @@ impl<const D: usize> Nearest<D> {
                 // All that is open, searched in cells far too large, would be pairs of everybody.
                 let sample = open.iter().step_by(open.len() / SAMPLE + 1);
                 let nearest = sample.filter_map(|&p| search.distance(&level, p)).filter(|&d| d > 0.0);
-                let nearest = nearest.fold(level.reach(), f64::min).max(LENGTH_LOW);
-                if 2.0 * nearest <= level.reach() {
-                    level = cells(nearest)?;
+                let least = (nearest.fold(level.reach(), f64::min) * SHELL).max(LENGTH_LOW);
+                // Served is at least the one that is so near.
+                if 2.0 * least <= level.reach() {
+                    level = cells(least)?;
                 }
             }
             reach = level.reach();
