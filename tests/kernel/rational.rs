@@ -85,3 +85,10 @@ fn rational_beside_a_tie_of_doubles_rounds_away_from_it() {
         }
     }
 }
+
+#[test]
+fn integers_are_rationals_without_a_denominator_to_see() {
+    let parts = |x: Rational| (x.numerator(), x.denominator(), x.to_string());
+    assert_eq!(parts(Rational::from(-7)), (-7, 1, String::from("-7")));
+    assert_eq!(parts(Rational::new(6, -4).expect("no zero")), (-3, 2, String::from("-3/2")));
+}

@@ -150,6 +150,17 @@ fn one_sided_refusals_count_axes_orders_and_epsilons() -> Result<()> {
     };
     assert_eq!((neighbors, conditions, rank), (COUNT - 1, 5, 2));
     assert!(near(ratio, 4.0), "{ratio}");
+    // So far away that the window vanishes at all of them nothing is left to solve with.
+    let mut far = Stencil::default();
+    far.reset(0, Some(0), 60.0 * EPSILON);
+    (1..COUNT).for_each(|q| far.push(Neighbor { q, separation: [(40.0 + 0.3 * q as f64) * EPSILON, 0.1], sign: 1 }));
+    let error = made(&slope(2)?, &far).err().expect("refused");
+    let ErrorKind::Operator(OperatorError::Uncertified { rank, condition, residual, .. }) = *error.kind() else {
+        panic!("{error}")
+    };
+    assert_eq!((rank, condition, residual), (0, f64::INFINITY, 1.0));
+    let error = made(&slope(2)?, &stencil(None)).err().expect("refused");
+    assert_eq!(*error.kind(), ErrorKind::Operator(OperatorError::NoCenter { neighbors: COUNT - 1 }));
     // As many neighbors on the side as conditions are enough.
     let side = |count: usize| -> Result<_> {
         let mut few = Stencil::default();
