@@ -3,6 +3,7 @@
 //! One small package that depends on this one by path holds every case: a bad program in `src/bin`, its twin in
 //! `examples`. Only our sentence is searched for, since rustc's own words change with its releases.
 
+use parops::testing::Promise;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::{env, fs};
@@ -216,5 +217,7 @@ fn wrong_programs_are_refused_in_our_words_and_their_twins_compile() {
             failures.push(format!("{} is refused without the sentence {:?}:\n{stderr}", case.name, case.sentence));
         }
     }
-    assert!(failures.is_empty(), "{}", failures.join("\n\n"));
+    Promise::new("Input", "sums of unequal degree and parts of another dimension do not compile, and are told why")
+        .case(failures.join("\n\n"))
+        .holds(failures.is_empty());
 }

@@ -15,6 +15,7 @@ mod accuracy;
 mod catalogue;
 mod conservation;
 mod dimensions;
+mod drawn;
 mod exactness;
 mod method;
 mod moments;

@@ -1,6 +1,6 @@
 //! DC-PSE in all its forms keeps the promises of a method, and is exact to the degree it names, by the checkers.
 
-use parops::testing::{MethodFault, check_method, check_method_moments};
+use parops::testing::{MethodFault, Promise, check_method, check_method_moments};
 use parops::{
     CellList, Cutoff, D2, D3, DcPse, Domain, Epsilon, Face, Gradient, Laplacian, Nearest, Neighbors, Operator,
     Particles, Qr, Sign, Window,
@@ -17,16 +17,25 @@ fn keeps<const D: usize, const K: usize, Op: Operator<D, Out = [f64; K]> + Clone
     neighbors: &impl Neighbors<D>,
 ) {
     let dcpse = DcPse::at_order(operator.clone(), order).unwrap();
+    let passes = |dcpse: &DcPse<Op>| {
+        Promise::new("Conformance", "DC-PSE of either sign, with either window, passes the checker of methods")
+            .equal(&check_method(dcpse, neighbors), &Ok(()));
+    };
     for sign in [Sign::Plus, Sign::Minus] {
         let dcpse = dcpse.clone().sign(sign);
-        assert_eq!(check_method(&dcpse, neighbors), Ok(()));
+        passes(&dcpse);
         let exact_to = degree + order - 1;
-        assert_eq!(check_method_moments(&dcpse, neighbors, &operator, exact_to, MOMENTS), Ok(()));
+        Promise::new(
+            "Conformance",
+            "DC-PSE has the moments of its operator to r - 1 above its degree, and not the next",
+        )
+        .equal(&check_method_moments(&dcpse, neighbors, &operator, exact_to, MOMENTS), &Ok(()));
         let beyond = check_method_moments(&dcpse, neighbors, &operator, exact_to + 1, MOMENTS);
         assert!(matches!(beyond, Err(MethodFault::Moment { alpha, .. }) if alpha.degree() == exact_to + 1));
     }
-    assert_eq!(check_method(&dcpse.clone().window(Window::Wendland), neighbors), Ok(()));
-    assert_eq!(check_method(&dcpse.clone().impose_zeroth(), neighbors), Ok(()));
+    passes(&dcpse.clone().window(Window::Wendland));
+    passes(&dcpse.clone().impose_zeroth());
+    // A solver is a type of its own.
     assert_eq!(check_method(&dcpse.solver(Qr), neighbors), Ok(()));
 }
 

@@ -12,6 +12,14 @@ fn sides<const D: usize>() -> Vec<usize> {
     [&[64, 102, 161, 256], &[24, 38, 60, 96], &[14, 18, 24, 32]][D - 1].to_vec()
 }
 
+/// As [`sides`], where sets are alike: gaps of a Kronecker sequence at Fibonacci numbers, Halton points at 2^a 3^b.
+fn evenly_scattered<const D: usize>(set: Set) -> Vec<usize> {
+    match set {
+        Set::QuasiRandom => [&[55, 89, 144, 233], &[24, 36, 72, 96]][D - 1].to_vec(),
+        _ => sides::<D>(),
+    }
+}
+
 fn holds<const D: usize, const K: usize, T: Field>(
     operator: impl Operator<D, Out = [f64; K]> + Clone,
     series: &Series,
@@ -23,12 +31,18 @@ fn holds<const D: usize, const K: usize, T: Field>(
         let name = format!("{D}D l {} output {k} r {order} {} even {even}", outcome.conditions, set.name());
         println!("{name}: {observed:.3?}, {} of {} rows grown", outcome.grown, outcome.rows);
         let r = f64::from(*order);
+        let sets = if *set == Set::Lattice { "lattices with whole shells" } else { "scattered sets" };
         for Band { what, low, high, value } in crate::bands::bands(series, D, observed) {
             let dimensions = if D == 3 { " in 3D" } else { "" };
             match what {
-                "L2" => Promise::new("Orders", format!("DC-PSE {D}D, r = {order}, L2 order")).within(low, high, value),
-                "face" => Promise::new("Orders", format!("DC-PSE, order at faces{dimensions} less r"))
-                    .at_least(low - r, value - r),
+                "L2" => {
+                    Promise::new("Orders", format!("DC-PSE {D}D on {sets}, r = {order}, L2 order"))
+                        .within(low, high, value);
+                }
+                "face" if low.is_finite() => {
+                    Promise::new("Orders", format!("DC-PSE, order at faces{dimensions} less r"))
+                        .at_least(low - r, value - r)
+                }
                 "L-inf" if low.is_finite() && high.is_finite() => {
                     Promise::new("Orders", "DC-PSE, L-inf order less r").within(-LINF, high - r, value - r);
                 }
@@ -105,6 +119,31 @@ fn odd_orders_on_lattices_with_whole_shells_are_one_higher() {
         let one = |series: Series| Series { seeds: 1, ..series };
         on_line::<f64>(one(series::<1>(Set::Lattice, order, false, sides::<1>())), [0.4; 2]);
         in_plane::<f64>(one(series::<2>(Set::Lattice, order, false, sides::<2>())), [0.4; 2]);
+    }
+}
+
+#[test]
+fn odd_orders_on_scattered_sets_are_the_design_order() {
+    // The leading error, of a stencil that is not symmetric, is of order r; the next one, larger than it on coarse sets
+    // whose stencils are almost symmetric, is the even one above: orders are between r and r + 1, and near r.
+    for set in [Set::Jittered, Set::QuasiRandom] {
+        for (order, wave) in [(1, 0.1), (3, 0.3)] {
+            on_line::<f64>(series::<1>(set, order, false, evenly_scattered::<1>(set)), [wave; 2]);
+            in_plane::<f64>(series::<2>(set, order, false, evenly_scattered::<2>(set)), [wave; 2]);
+        }
+    }
+}
+
+#[test]
+fn orders_five_six_and_eight_on_scattered_sets_are_the_design_order() {
+    // Waves are as short as stencils at faces bear, to stay above rounding. In the plane a few corners lead the norm over
+    // the faces, and leave its order in doubt by 0.5 with so few sets: the interior alone.
+    for set in [Set::Jittered, Set::QuasiRandom] {
+        for (order, wave) in [(5, [0.9, 1.0]), (6, [0.9, 1.0]), (8, [1.4, 1.6])] {
+            on_line::<f64>(series::<1>(set, order, false, evenly_scattered::<1>(set)), wave);
+            let plane = series::<2>(set, order, false, evenly_scattered::<2>(set));
+            in_plane::<f64>(Series { targets: 150, faces: false, ..plane }, wave);
+        }
     }
 }
 

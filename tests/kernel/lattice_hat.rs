@@ -5,6 +5,7 @@ use crate::properties::properties;
 use parops::{
     Apply, CellList, CenterTerm, Cutoff, Domain, Epsilon, Error, ErrorKind, Form, Kernel, LatticeHat, MultiIndex,
     Neighbor, OperatorError, Particles, Pse, Random, Rows, Spacing, Stencil, Volumes, discrete_moments, graded,
+    testing::Promise,
 };
 use proptest::prelude::*;
 
@@ -48,9 +49,11 @@ fn equal_to_rounding<const D: usize>(n: usize, seed: u64) -> Failure {
     assert_eq!(rows.report().most, 2 * D, "the unit steps and no others");
     // Separations of positions up to 1 are rounded to eps/2 of 1, n eps/2 of a step, which is the error of a weight;
     // two such positions, and as much again for weights, volumes and sums. |f_q - f_p| <= 1, 2 D weights of n^2.
-    let bound = 4.0 * (n as f64 + 4.0) * f64::EPSILON * (2 * D * n * n) as f64;
+    let unit = (n as f64 + 4.0) * f64::EPSILON * (2 * D * n * n) as f64;
     for (found, difference) in found.iter().zip(&difference) {
-        assert!((found - difference).abs() <= bound, "{D} {n}: {found} {difference}");
+        Promise::new("Kernels", "PSE with the lattice hat against finite differences, h = 1/n")
+            .in_units("(n + 4) eps sum w", unit)
+            .at_most(4.0, (found - difference).abs());
     }
     Ok(())
 }
@@ -86,7 +89,9 @@ fn pse_with_the_hat_is_the_finite_difference_bit_for_bit_where_h_is_a_power_of_t
             assert!(found.iter().zip(&difference).all(|(a, b)| (a - b).abs() <= bound));
         }
         let (found, difference, _) = both::<1>(64, seed)?;
-        assert_eq!(found, difference, "two terms have no order");
+        // Two terms have no order.
+        Promise::new("Kernels", "PSE with the lattice hat in 1D, h = 1/64, bits of the finite difference")
+            .equal(&found, &difference);
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use parops::{
     CenterTerm, Exchange, Gaussian, Kernel, MultiIndex, Neighbor, Rational, Stencil, Term, Volumes, WideGaussian,
-    continuous_moment, discrete_moment, graded,
+    continuous_moment, discrete_moment, graded, testing::Promise,
 };
 use serde_json::Value;
 
@@ -45,16 +45,20 @@ fn compare<const D: usize>(operator: &str, order: u32, entry: &Value) -> usize {
     let polynomial = kernel.exact().expect("exact");
     let monomials = entry["monomials"].as_object().expect("monomials");
     assert_eq!(polynomial.iter().count(), monomials.len(), "{operator} d{D} r{order}");
+    let same = |what: &str| {
+        let name = format!("{operator} d{D} r{order} {what}");
+        Promise::new("Kernels", "Exchange coefficients and moments against the table, as fractions").case(name)
+    };
     for (key, value) in monomials {
-        assert_eq!(polynomial.coefficient(index(key)), rational(value), "{operator} d{D} r{order} z^({key})");
+        same(key).equal(&polynomial.coefficient(index(key)), &rational(value));
     }
-    assert_eq!(kernel.moment(MultiIndex::ZERO).expect("M_0"), rational(&entry["M_0"]), "{operator} d{D} r{order}");
+    same("M_0").equal(&kernel.moment(MultiIndex::ZERO).expect("M_0"), &rational(&entry["M_0"]));
     let leading = entry["leading_error_moments"].as_object().expect("leading_error_moments");
     let degree = terms::<D>(operator)[0].index.degree() + order;
     for alpha in graded::<D>(degree, degree) {
         let key = alpha.exponents().map(|n| n.to_string()).join(",");
         let expected = leading.get(&key).map_or(Rational::ZERO, rational);
-        assert_eq!(kernel.moment(alpha).expect("moment"), expected, "{operator} d{D} r{order} M_({key})");
+        same(&key).equal(&kernel.moment(alpha).expect("moment"), &expected);
     }
     monomials.len() + 1 + leading.len()
 }

@@ -5,7 +5,7 @@ use crate::dense;
 use crate::properties::properties;
 use parops::{
     Allowance, Along, Apply, CellList, CsrMatrix, DcPse, Domain, ErrorKind, Laplacian, LinearError, Nearest, Particles,
-    Pse, Result, Rows, Sign, Spectrum, SpectrumEstimator,
+    Pse, Result, Rows, Sign, Spectrum, SpectrumEstimator, testing::Promise,
 };
 use proptest::prelude::*;
 
@@ -61,9 +61,15 @@ fn estimates_agree_with_dense_eigenvalues_on_lattice_jittered_and_random_sets() 
             let (right, outer) = dense::extremes(&dense::matrix(rows.targets(), |u, du| rows.apply(u, du)));
             let found = estimate(&rows);
             assert!(found.converged && found.residual <= 1e-9 * found.radius, "{name} {operator} {found:?}");
-            assert!((found.abscissa - right).abs() <= CONVERGED * outer, "{name} {operator} {right} {found:?}");
+            let against = |text| Promise::new("Limits of steps", text).case(format!("{name} {operator}"));
+            against("estimated growth against all eigenvalues, of the radius")
+                .at_most(CONVERGED, (found.abscissa - right).abs() / outer);
             // The radius is found to a residual of 1e-3.
-            assert!((found.radius / outer - 1.0).abs() <= 1e-3, "{name} {operator} {outer} {found:?}");
+            against("estimated spectral radius over that of all eigenvalues, less 1").within(
+                -1e-3,
+                1e-3,
+                found.radius / outer - 1.0,
+            );
             assert!(found.applies <= 3000 && !found.exact, "{name} {operator} {found:?}");
 
             let all = SpectrumEstimator::new().of(&rows).unwrap();
@@ -82,7 +88,9 @@ fn slow_growth_amid_the_imaginary_axis_is_found_to_half_a_percent_of_the_radius(
         let rows = advection(&set, Sign::Plus, 26).unwrap();
         let (right, outer) = dense::extremes(&dense::matrix(rows.targets(), |u, du| rows.apply(u, du)));
         let found = estimate(&rows);
-        assert!((found.abscissa - right).abs() <= 0.005 * outer, "{right} {outer} {found:?}");
+        Promise::new("Limits of steps", "slow growth estimated amid the imaginary axis against all eigenvalues")
+            .in_units("of the radius", outer)
+            .at_most(0.005, (found.abscissa - right).abs());
         assert!(right > 0.0 && found.abscissa > 1e-8 * found.radius, "{found:?}");
     }
 }
@@ -210,8 +218,9 @@ proptest! {
         let right = turning.iter().map(|t| t.0).chain(real.iter().copied()).fold(f64::NEG_INFINITY, f64::max);
         let outer = turning.iter().map(|t| t.0.hypot(t.1)).chain(real.iter().map(|x| x.abs())).fold(0.0, f64::max);
         // A normal matrix; eigenvalues that nearly coincide are told apart only down to the breakdown of the subspace.
-        prop_assert!((found.abscissa - right).abs() <= 1e-7 * outer.max(1.0), "{right} {found:?}");
-        prop_assert!((found.radius - outer).abs() <= 1e-3 * outer, "{outer} {found:?}");
+        let known = |text, size| Promise::new("Limits of steps", text).in_units("of the radius", size);
+        known("growth of matrices of known spectra", outer.max(1.0)).at_most(1e-7, (found.abscissa - right).abs());
+        known("spectral radius of matrices of known spectra", outer).at_most(1e-3, (found.radius - outer).abs());
         // Rounding of a normal matrix of norm 10 at most.
         let size = outer.max(1.0);
         prop_assert!((all.abscissa - right).abs() <= 1e-12 * size && (all.radius - outer).abs() <= 1e-12 * size, "{all:?}");

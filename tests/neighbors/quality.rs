@@ -2,6 +2,7 @@
 
 use parops::{
     BruteForce, Cutoff, Domain, DomainError, ErrorKind, Face, Neighbors, Particles, SetQuality, Volumes, least_gap,
+    testing::Promise,
 };
 
 const EPS: f64 = f64::EPSILON;
@@ -21,8 +22,10 @@ fn set_quality_agrees_with_what_brute_force_counts() {
         let loneliest = quality.loneliest.unwrap();
         assert_eq!(counts[loneliest], quality.fewest);
         counts.sort_unstable();
-        assert_eq!((quality.fewest, quality.median, quality.most), (counts[0], counts[72], counts[143]));
-        assert_eq!(quality.separation, least_gap(&all));
+        Promise::new("Neighbor lists", "counts and least gap of the quality of a set against brute force").equal(
+            &(quality.fewest, quality.median, quality.most, quality.separation),
+            &(counts[0], counts[72], counts[143], least_gap(&all)),
+        );
         let mut least = f64::INFINITY;
         all.for_each(quality.closest.unwrap(), 0.2, |q| least = least.min(q.separation[0].hypot(q.separation[1])));
         // A root of the sum of squares, and hypot: two roundings apart.
@@ -65,7 +68,9 @@ fn fill_sees_a_hole_that_counts_do_not() {
         let quality = SetQuality::measure(&set, &domain, Cutoff(0.3)).unwrap();
         // The nearest of those left around (0.5, 0.5) is at (0.5, 2.5) h; probes are 0.7 h apart at most.
         let hole = 0.5_f64.hypot(2.5) / 20.0;
-        assert!(quality.fill <= hole + EPS && quality.fill >= hole - 0.7 / 20.0, "{}", quality.fill * 20.0);
+        Promise::new("Neighbor lists", "radius of a hole as the quality of a set sees it, less the hole")
+            .in_units("h", 1.0 / 20.0)
+            .within(-0.7, 20.0 * EPS, quality.fill - hole);
     }
     let sparse = Particles::new(vec![[0.1, 0.1]]).unwrap();
     assert_eq!(SetQuality::measure(&sparse, &torus(), Cutoff(0.1)).unwrap().fill, f64::INFINITY);

@@ -1,6 +1,6 @@
 //! The stepper checker: it passes the steppers that keep their promises and catches every one that breaks one.
 
-use parops::testing::{StepperFault, check_stepper};
+use parops::testing::{Promise, StepperFault, check_stepper};
 use parops::{Error, Euler, Leapfrog, Result, Rhs, Rk4, Rkl2, SspRk3, Stepper, TimeError};
 
 #[test]
@@ -21,7 +21,9 @@ fn steppers_of_the_crate_keep_their_promises() {
     ];
     for (report, stages, order) in reports {
         let report = report.unwrap_or_else(|fault| panic!("{fault}"));
-        assert!(report.stages == stages && (report.order - order).abs() <= SLACK, "{report:?}");
+        Promise::new("Conformance", "steppers pass their checker with the stages and the order they state")
+            .case(format!("{report:?}"))
+            .holds(report.stages == stages && (report.order - order).abs() <= SLACK);
     }
 }
 
