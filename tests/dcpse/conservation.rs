@@ -80,7 +80,7 @@ fn symmetrized(n: usize, r: u32, seed: u64) -> Errors {
     let conserving = &s * &u + sums(&s);
     // What conserves sums to zero: its pair terms are antisymmetric.
     let antisymmetric = Promise::new("Conservation", "symmetrized DC-PSE gradient, sum over sum of magnitudes");
-    antisymmetric.at_most(1e-12, conserving.sum().abs() / conserving.lp_norm(1));
+    antisymmetric.at_most(1e-14, conserving.sum().abs() / conserving.lp_norm(1));
     Errors { dcpse: rms(&w * &u - sums(&w)), conserving: rms(conserving), consistent: rms(&s * &u - sums(&s)) }
 }
 

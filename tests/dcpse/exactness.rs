@@ -20,7 +20,7 @@ fn laplacian_of_a_polynomial_is_exact_on_a_scattered_set_to_its_edges() -> Failu
     for (x, out) in particles.points().iter().zip(out) {
         let exact = 20.0 * x[0].powi(3) - 12.0 * x[0] * x[1] * x[1];
         Promise::new("Residuals", "Laplacian of r = 4 of a polynomial of degree 5, to the edges")
-            .at_most(1e-8, (out - exact).abs());
+            .at_most(1e-11, (out - exact).abs());
     }
     let report = rows.report();
     Promise::new("Residuals", "Laplacian of r = 4 of a polynomial of degree 5, residual reported")
@@ -60,7 +60,7 @@ fn lattice_weights_approach_finite_differences_as_their_outer_nodes_lose_weight(
     // Four neighbors and the particle are as many as the conditions: nothing is left to the window, only to rounding.
     for c in [2.0, 2.5] {
         let fewest = format!("lattice weights of the fewest nodes against finite differences, h/epsilon = {c}");
-        Promise::new("Orders", fewest).at_most(1e-9, miss_of_finite_differences(2.0, c)?);
+        Promise::new("Orders", fewest).at_most(1e-14, miss_of_finite_differences(2.0, c)?);
     }
     // Of seven nodes the windows exp(-z^2) at 2 h and 3 h have the ratio exp(5 c^2), and the least-norm weights miss by
     // 5/3 of its inverse (1.085, 1.012, 1.001 and 1.000 of that in sixty digits).

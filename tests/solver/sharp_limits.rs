@@ -12,7 +12,7 @@ use parops::{
 use crate::dense;
 
 /// By how much rounding may take the spectral radius of a stable step above 1.
-const STABLE: f64 = 1e-10;
+const STABLE: f64 = 1e-11;
 
 type Field = Vec<f64>;
 type AnyStepper = Box<dyn Stepper<Field>>;

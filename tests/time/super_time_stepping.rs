@@ -241,7 +241,7 @@ fn sharp(rows: &Rows, rate: f64) {
         let (inside, outside) =
             (radius(rows, &mut *stepper, 0.99 * largest), radius(rows, &mut *stepper, 1.01 * largest));
         let radius = |text| Promise::new("Limits of steps", text);
-        radius("spectral radius of explicit schemes at 0.99 of their limit, less 1").at_most(1e-10, inside - 1.0);
+        radius("spectral radius of explicit schemes at 0.99 of their limit, less 1").at_most(1e-12, inside - 1.0);
         let beyond = radius("spectral radius of explicit schemes at 1.01 of their limit, less 1");
         beyond.at_least(1e-6, outside - 1.0);
     }
