@@ -15,6 +15,8 @@ mod failures;
 #[allow(dead_code)]
 #[path = "../figure/mod.rs"]
 mod figure;
+#[path = "../figure/grid.rs"]
+mod grid;
 mod inputs;
 #[path = "../options/mod.rs"]
 mod options;

@@ -15,7 +15,8 @@ use crate::case::Duty::{Adapt, Detect, Prevent};
 use crate::case::{Case, Entry};
 use crate::dense::{eigenvalues, matrix};
 use crate::failures::{sets, spectra};
-use crate::figure::{Axes, Curve, Mark, draw};
+use crate::figure::{Axes, Curve, Mark};
+use crate::grid;
 use crate::page::Figure;
 
 type C = Complex<f64>;
@@ -42,6 +43,8 @@ const M: usize = 12;
 const H: f64 = 1.0 / M as f64;
 const N: usize = M * M;
 const JITTER: f64 = 0.3;
+/// |Im| over |Re| of the eigenvalues that RKL2 is held to where rows are not symmetric.
+const SLOPE: f64 = 0.2;
 
 /// R(z) of u' = z u by one step of size 1.
 fn factor(stepper: &mut dyn Stepper<Vec<f64>>, z: C) -> Result<f64> {
@@ -236,6 +239,46 @@ fn axes(title: &str) -> Axes<'_> {
     Axes { title, x: "Re(dt lambda)", y: "Im(dt lambda)", logarithmic: false }
 }
 
+/// Width over height of the inside of a panel, in pixels.
+const PROPORTION: f64 = 1.27;
+
+/// The curves, and two unseen corners of a frame in which both axes have one scale.
+fn equally(mut curves: Vec<Curve>) -> Vec<Curve> {
+    let points = || curves.iter().flat_map(|curve| &curve.points);
+    let range = |of: fn(&(f64, f64)) -> f64| {
+        points().map(of).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
+    };
+    let ((left, right), (low, high)) = (range(|p| p.0), range(|p| p.1));
+    let height = (high - low).max((right - left) / PROPORTION);
+    let (x, y) = (0.5 * (left + right), 0.5 * (low + high));
+    for side in [-0.5, 0.5] {
+        curves.push(region("", vec![(x + side * PROPORTION * height, y + side * height)], 0));
+    }
+    curves
+}
+
+/// The region of super time stepping with the eigenvalues at its limit, and its wedge if it has one. It is far longer than high:
+/// its axes have scales of their own.
+fn super_steps<'a>(
+    mut stages: Rkl2<Vec<f64>>,
+    title: &'a str,
+    values: &[C],
+    radius: f64,
+) -> Result<(Axes<'a>, Vec<Curve>)> {
+    let interval = stages.negative_real_interval();
+    let whole = Rkl2::<Vec<f64>>::new(stages.stages())?.negative_real_interval();
+    let mut curves = vec![
+        region("RKL2", columns(&mut stages, -whole)?, 4),
+        scaled(values, StepLimit::from_spectral_bound(radius, 1.0)?.step(&stages), "dt of RKL2", Mark::CirclesAlone, 5),
+    ];
+    let ends = [1.0, -1.0].map(|side| (-interval, side * SLOPE * interval));
+    if interval < whole {
+        let wedge = vec![ends[0], (0.0, 0.0), ends[1]];
+        curves.push(Curve { name: "wedge of slope 0.2".into(), points: wedge, mark: Mark::Dashed, color: 7 });
+    }
+    Ok((axes(title), curves))
+}
+
 /// The figures, written to the folder and returned for the page.
 pub fn figures(out: &Path) -> std::result::Result<Vec<Figure>, Box<dyn Error>> {
     let Spectra { diffusion, laplacian, bare, damped, limits, .. } = Spectra::measure()?;
@@ -253,35 +296,26 @@ pub fn figures(out: &Path) -> std::result::Result<Vec<Figure>, Box<dyn Error>> {
     first.push(scaled(&diffusion, euler, "dt of Euler", Mark::CirclesAlone, 3));
     let mut second: Vec<Curve> = regions().collect();
     second.push(scaled(&diffusion, 1.1 * rk4, "1.1 dt of RK4", Mark::CirclesAlone, 1));
-    let mut stages = Rkl2::new(8)?;
-    let interval = stages.negative_real_interval();
-    let third = vec![
-        region("RKL2 of 8 stages", columns(&mut stages, -interval)?, 4),
-        scaled(&diffusion, sharp(&stages)?, "its dt", Mark::CirclesAlone, 3),
-    ];
     let path = out.join("extremes_diffusion_spectra.svg");
-    draw(
-        &path,
-        &[
-            (axes("Diffusion at the limit of Euler"), first),
-            (axes("and above that of RK4"), second),
-            (axes("Super time stepping at its limit"), third),
-        ],
-    )?;
+    let panels = vec![
+        (axes("Diffusion at the limit of Euler"), equally(first)),
+        (axes("and above that of RK4"), equally(second)),
+        super_steps(Rkl2::new(8)?, "RKL2 of 8 stages on the axis", &diffusion, radius)?,
+        super_steps(Rkl2::new(16)?.with_slope(SLOPE)?, "of 16 in a wedge, as for DC-PSE", &diffusion, radius)?,
+    ];
+    grid::draw(&path, 2, panels)?;
     let limit = limits.step(&Rk4::<Vec<f64>>::new());
     let panel = |values: &[C], name: &str| {
         let mut curves: Vec<Curve> = regions().collect();
         curves.push(scaled(values, limit, name, Mark::CirclesAlone, 3));
-        curves
+        equally(curves)
     };
     let other = out.join("extremes_advection_spectra.svg");
-    draw(
-        &other,
-        &[
-            (axes("Advection without hyperviscosity"), panel(&bare, "-v . grad")),
-            (axes("Advection with hyperviscosity"), panel(&damped, "and hyperviscosity")),
-        ],
-    )?;
+    let panels = vec![
+        (axes("Advection without hyperviscosity"), panel(&bare, "-v . grad at the limit of RK4")),
+        (axes("Advection with hyperviscosity"), panel(&damped, "-v . grad at the limit of RK4")),
+    ];
+    grid::draw(&other, 2, panels)?;
     let caption = |operator: &str| {
         format!("Eigenvalues of {operator} on {M}x{M} particles, jitter {JITTER} h, over the stability regions")
     };

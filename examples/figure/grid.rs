@@ -16,8 +16,8 @@ const ENTRY: (u32, u32) = (220, 24);
 const LETTER: u32 = 8;
 const BESIDE: u32 = 48;
 
-/// Draws logarithmic panels, row after row, and below them an entry for each name among their curves: those of one name
-/// are to look alike.
+/// Draws panels, row after row, and below them an entry for each name among their curves, the dashed ones last: those of one
+/// name are to look alike.
 pub fn draw(path: &Path, columns: usize, panels: Vec<(Axes, Vec<Curve>)>) -> Result<(), Box<dyn Error>> {
     let mut svg = String::new();
     drawing(&mut svg, columns, panels).map_err(|error| error.to_string())?;
@@ -38,6 +38,8 @@ fn drawing<'a>(
             entries.push((name, curve.mark, curve.color));
         }
     }
+    // What is dashed is there to compare with.
+    entries.sort_by_key(|(_, mark, _)| *mark == crate::figure::Mark::Dashed);
     let rows = panels.len().div_ceil(columns);
     let width = PANEL.0 * columns as u32;
     let longest = entries.iter().map(|entry| entry.0.len() as u32).max().unwrap_or(0);

