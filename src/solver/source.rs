@@ -55,10 +55,10 @@ impl<F: Fn(&[f64; D], f64, E) -> E + Sync, const D: usize, E: Fields> SceneTerm<
 /// How many limits long a legal step may be. Rates of a source come from difference quotients, whose rounding differs from
 /// field to field: a step at the limit of one moment shall be legal at the next.
 pub(super) fn slack<const D: usize, E: Fields, S: SceneTerm<D, E>>() -> f64 {
-    if S::PRESENT { 1.0 + ROUNDINGS * E::EPSILON.powf(2.0 / 3.0) } else { 1.0 }
+    if S::PRESENT { 1.0 + ROUNDINGS * E::EPSILON.sqrt() } else { 1.0 }
 }
 
-/// Of a difference quotient, in eps^(2/3) of the rates of all terms together.
+/// Of a difference quotient, in sqrt(eps) of the rates of all terms together.
 const ROUNDINGS: f64 = 16.0;
 
 /// How fast S makes fields decay at one particle, from difference quotients: -dS/du of one field; of several the largest
@@ -93,13 +93,13 @@ fn decay<const D: usize, E: Fields>(
     Ok(sums)
 }
 
-/// The changes of u that difference quotients are taken with, field by field: cbrt(eps) of the largest value, of 1 where all
-/// are zero. What rounds then, eps^(2/3) of S, is far below what [`slack`] allows.
+/// The changes of u that difference quotients are taken with, field by field: sqrt(eps) of the largest value, of 1 where all
+/// are zero; upwards, since sources may know no negative fields.
 fn difference<E: Fields>(u: &[E]) -> E {
     let mut scale = E::ZERO;
     for i in 0..E::FIELDS {
         let largest = u.iter().fold(0.0_f64, |most, u| most.max(u.get(i).abs()));
-        scale.set(i, E::EPSILON.cbrt() * if largest > 0.0 { largest } else { 1.0 });
+        scale.set(i, E::EPSILON.sqrt() * if largest > 0.0 { largest } else { 1.0 });
     }
     scale
 }
