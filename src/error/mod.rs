@@ -79,7 +79,7 @@ enum Remedy {
     /// A provider built with this cutoff.
     Cutoff(f64),
     /// Nothing but more particles: there are `found`, and at least `needed` are needed.
-    Particles { found: usize, needed: usize },
+    Particles { found: u32, needed: u32 },
 }
 
 impl Error {
@@ -111,6 +111,8 @@ impl Error {
 
     /// Says that the whole set of `found` particles is too small, whatever the cutoff.
     pub(crate) fn lacking(mut self, found: usize, needed: usize) -> Self {
+        // Both are less than the neighbors of a row; in 32 bits an error stays as small as it was.
+        let [found, needed] = [found, needed].map(|count| u32::try_from(count).unwrap_or(u32::MAX));
         self.remedy = Some(Remedy::Particles { found, needed });
         self
     }

@@ -225,7 +225,7 @@ impl MomentSolver for Refusing {
         _: &mut MomentScratch<T>,
         _: &mut [T],
     ) -> parops::Result<Solution<T>> {
-        Err(self.0.clone().into())
+        Err(self.0.into())
     }
 }
 
@@ -250,6 +250,6 @@ fn rows_of_solvers_that_find_no_weights_are_refused_with_all_that_is_known() {
     assert!((ratio / CUTOFF_OVER_EPSILON - 1.0).abs() < 4.0 * EPS, "{ratio}");
     // What is no matter of rank is handed on as it is.
     let own = OperatorError::Setting { value: 7.0 };
-    let error = refused(Refusing(own.clone()), &second, &stencils);
+    let error = refused(Refusing(own), &second, &stencils);
     assert_eq!((error.kind(), error.particle()), (&ErrorKind::Operator(own), Some(0)));
 }
