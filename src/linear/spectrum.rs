@@ -49,6 +49,9 @@ pub struct SpectrumEstimator {
     dense: usize,
 }
 
+/// du = A u; one type for all maps, so that a program holds the search once.
+type Product<'a> = dyn FnMut(&[f64], &mut [f64]) -> Result<()> + 'a;
+
 /// What is known of a spectrum, in the units of the operator, 1/time for a right-hand side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -94,18 +97,21 @@ impl Default for SpectrumEstimator {
 
 impl SpectrumEstimator {
     /// The estimator at its defaults.
+    #[inline]
     pub fn new() -> Self {
         Self { subspace: 32, tolerance: 1e-9, most: 3000, dense: 640 }
     }
 
     /// Sets the number m of vectors, at least 8.
     #[must_use]
+    #[inline]
     pub fn subspace(self, vectors: usize) -> Self {
         Self { subspace: vectors.max(8), ..self }
     }
 
     /// Sets after how many products a run ends, at the next restart.
     #[must_use]
+    #[inline]
     pub fn most(self, products: usize) -> Self {
         Self { most: products, ..self }
     }
@@ -153,6 +159,10 @@ impl SpectrumEstimator {
     /// [`LinearError::NotConverged`] where the eigenvalues of the small matrix are not found;
     /// [`ParticleError::Memory`](crate::ParticleError::Memory) where m + 1 vectors do not fit.
     pub fn estimate(&self, n: usize, mut apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<Spectrum> {
+        self.found(n, &mut apply)
+    }
+
+    fn found(&self, n: usize, mut apply: &mut Product<'_>) -> Result<Spectrum> {
         if n == 0 {
             return Ok(Spectrum::default());
         }
@@ -173,10 +183,10 @@ impl SpectrumEstimator {
                 return found;
             }
         }
-        self.estimate(n, apply)
+        self.found(n, &mut apply)
     }
 
-    fn runs(&self, n: usize, mut apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<Spectrum> {
+    fn runs(&self, n: usize, mut apply: &mut Product<'_>) -> Result<Spectrum> {
         let outer = Search { subspace: self.subspace, tolerance: self.tolerance.max(1e-3), most: self.most };
         let largest = outer.run(n, &mut apply, |value| value.norm(), 0.0)?;
         let right = Search { tolerance: self.tolerance, ..outer };
