@@ -35,7 +35,7 @@ const OVERLAP: f64 = 1.5;
 /// Where the kernels of upwind are cut, in units of epsilon = h.
 const UPWIND_SUPPORT: f64 = 4.0;
 /// Particles along an axis of the sets that tell gamma.
-const COARSE: [usize; 3] = [16, 16, 10];
+const COARSE: [usize; 3] = [16, 16, 7];
 
 /// How far an order may be from where it must be.
 const BAND: f64 = 0.3;

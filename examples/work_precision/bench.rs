@@ -40,8 +40,8 @@ impl Bench {
     pub fn new(quick: bool, once: bool, out: PathBuf) -> Self {
         let runs = match (once, quick) {
             (true, _) => Runs { most: 1, seconds: 0.0, long: 0.0 },
-            (_, true) => Runs { most: FEWEST, seconds: 0.0, long: 0.05 },
-            _ => Runs { most: 15, seconds: 0.2, long: 0.4 },
+            (_, true) => Runs { most: FEWEST, seconds: 0.0, long: 0.02 },
+            _ => Runs { most: 15, seconds: 0.1, long: 0.2 },
         };
         let (table, once) = (Table::default(), 0);
         Self { quick, runs, once, out, table, figures: Vec::new(), notes: Vec::new(), claims: Vec::new() }

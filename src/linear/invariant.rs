@@ -11,8 +11,10 @@ type C = Complex<f64>;
 pub(super) struct Ordered {
     /// The eigenvalues, foremost first; of a pair of conjugates both, one after the other.
     pub(super) values: Vec<C>,
-    /// U with H U = U T, T upper triangular with the eigenvalues on its diagonal.
+    /// U with H U = U T.
     vectors: DMatrix<C>,
+    /// T, upper triangular with the eigenvalues on its diagonal, in units of `scale`.
+    triangle: DMatrix<C>,
 }
 
 impl Ordered {
@@ -23,7 +25,8 @@ impl Ordered {
         let scale = norm(h.as_slice());
         if !(scale > 0.0 && scale.is_finite()) {
             let values = vec![C::new(0.0, 0.0); size];
-            return (scale == 0.0).then(|| Self { values, vectors: DMatrix::identity(size, size) });
+            let (vectors, triangle) = (DMatrix::identity(size, size), DMatrix::zeros(size, size));
+            return (scale == 0.0).then_some(Self { values, vectors, triangle });
         }
         let (u, t) = form(h, scale)?;
         let (mut u, mut t) = (u.map(|x| C::new(x, 0.0)), t.map(|x| C::new(x, 0.0)));
@@ -52,7 +55,12 @@ impl Ordered {
                 unit -= 1;
             }
         }
-        Some(Self { values: (0..size).map(|i| t[(i, i)] * scale).collect(), vectors: u })
+        Some(Self { values: (0..size).map(|i| t[(i, i)] * scale).collect(), vectors: u, triangle: t })
+    }
+
+    /// The condition of the foremost eigenvalue.
+    pub(super) fn condition_of_first(&self) -> f64 {
+        in_triangle(&self.triangle, 0)
     }
 
     /// The last entry of the eigenvector of the foremost eigenvalue: by how much it fails to be one of the whole.
@@ -80,11 +88,11 @@ impl Ordered {
     }
 }
 
-/// All eigenvalues of a real matrix. `None` where they are not found.
-pub(super) fn eigenvalues(a: &DMatrix<f64>) -> Option<Vec<C>> {
+/// All eigenvalues of a real matrix, and its Schur form in units of its norm. `None` where they are not found.
+pub(super) fn eigenvalues(a: &DMatrix<f64>) -> Option<(Vec<C>, DMatrix<f64>)> {
     let (size, scale) = (a.nrows(), norm(a.as_slice()));
     if !(scale > 0.0 && scale.is_finite()) {
-        return (scale == 0.0).then(|| vec![C::new(0.0, 0.0); size]);
+        return (scale == 0.0).then(|| (vec![C::new(0.0, 0.0); size], DMatrix::zeros(size, size)));
     }
     let t = form(a, scale)?.1;
     let mut values = Vec::with_capacity(size);
@@ -99,7 +107,41 @@ pub(super) fn eigenvalues(a: &DMatrix<f64>) -> Option<Vec<C>> {
             values.push(C::new(t[(i, i)] * scale, 0.0));
         }
     }
-    Some(values)
+    Some((values, t))
+}
+
+/// The condition |x| |y| / |y* x| of eigenvalue number i of [`eigenvalues`], x and y its right and left eigenvectors: by how
+/// much more than the matrix it may change.
+pub(super) fn condition(t: &DMatrix<f64>, i: usize) -> f64 {
+    let size = t.nrows();
+    let (mut t, mut none) = (t.map(|x| C::new(x, 0.0)), DMatrix::zeros(0, size));
+    (1..size).for_each(|i| {
+        if t[(i, i - 1)].re != 0.0 {
+            split(&mut t, &mut none, i - 1)
+        }
+    });
+    in_triangle(&t, i)
+}
+
+/// The condition of entry i of the diagonal of a triangle.
+fn in_triangle(t: &DMatrix<C>, i: usize) -> f64 {
+    let (one, zero) = (C::new(1.0, 0.0), C::new(0.0, 0.0));
+    let entry = |sum: C, j: usize| {
+        let apart = t[(i, i)] - t[(j, j)];
+        if sum == zero { zero } else { sum * apart.conj() / apart.norm_sqr() }
+    };
+    // T x = lambda x ends at i, y* T = lambda y* begins there; both are 1 there, and their product is.
+    let (mut x, mut y) = (vec![zero; i + 1], vec![one]);
+    x[i] = one;
+    for j in (0..i).rev() {
+        x[j] = entry((j + 1..=i).fold(zero, |sum, k| sum + t[(j, k)] * x[k]), j);
+    }
+    for j in i + 1..t.ncols() {
+        y.push(entry((i..j).fold(zero, |sum, k| sum + y[k - i] * t[(k, j)]), j));
+    }
+    let size = |z: &[C]| z.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt();
+    let condition = size(&x) * size(&y);
+    if condition.is_finite() { condition } else { f64::INFINITY }
 }
 
 /// U and T with A U = scale U T.
@@ -141,7 +183,7 @@ fn rotate(t: &mut DMatrix<C>, u: &mut DMatrix<C>, i: usize, a: C, b: C) {
         t[(i, column)] = a * x + b * y;
         t[(i + 1, column)] = a.conj() * y - b.conj() * x;
     }
-    for (matrix, rows) in [(&mut *t, (i + 2).min(u.nrows())), (u, usize::MAX)] {
+    for (matrix, rows) in [(t, i + 2), (u, usize::MAX)] {
         for row in 0..rows.min(matrix.nrows()) {
             let (x, y) = (matrix[(row, i)], matrix[(row, i + 1)]);
             matrix[(row, i)] = a.conj() * x + b.conj() * y;

@@ -3,11 +3,18 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::invariant::Ordered;
+use super::norm::norm;
 use crate::error::{Error, LinearError, Result};
 use crate::particles::{Random, reserved};
 
 /// Restarts over which a foremost eigenvalue must not be overtaken.
 const STEADY: usize = 4;
+
+/// Times what the condition of an eigenvalue says of its error: of a pair that is one eigenvalue torn apart it says half.
+const MARGIN: f64 = 8.0;
+
+/// Rounding of products with rows whose weights are rounded themselves, in units of the radius.
+const ROUNDED: f64 = 128.0 * f64::EPSILON;
 
 /// What a search found.
 #[derive(Clone, Copy, Debug)]
@@ -15,6 +22,8 @@ pub(super) struct Foremost {
     pub(super) value: Complex<f64>,
     /// |A x - lambda x| of the unit vector x that belongs to it.
     pub(super) residual: f64,
+    /// How far that lets the value be off.
+    pub(super) error: f64,
     pub(super) applies: usize,
     pub(super) converged: bool,
 }
@@ -72,15 +81,17 @@ impl Search {
             let value = ordered.values[0];
             radius = ordered.values.iter().fold(radius, |radius, value| radius.max(value.norm()));
             let residual = beta * ordered.last_of_first();
+            // Products round, too.
+            let error = MARGIN * residual.max(ROUNDED * radius) * ordered.condition_of_first();
             let unit = self.tolerance * radius;
             steady = if key(value) - before <= unit { steady + 1 } else { 0 };
             before = key(value);
             let converged = beta == 0.0 || (residual <= unit && steady >= STEADY);
             if converged || applies >= self.most || full < size || size < 4 {
-                return Ok(Foremost { value, residual, applies, converged });
+                return Ok(Foremost { value, residual, error, applies, converged });
             }
             let Some(turn) = ordered.basis((size / 3).max(2)).filter(|turn| turn.ncols() < size) else {
-                return Ok(Foremost { value, residual, applies, converged });
+                return Ok(Foremost { value, residual, error, applies, converged });
             };
             kept = turn.ncols();
             let small = turn.transpose() * &part * &turn;
@@ -108,8 +119,8 @@ impl Basis {
         vectors.resize(count, 0.0);
         let mut random = Random::new(0x5eed);
         vectors[..n].iter_mut().for_each(|x| *x = 2.0 * random.uniform() - 1.0);
-        let norm = length(&vectors[..n]);
-        vectors[..n].iter_mut().for_each(|x| *x /= norm);
+        let whole = norm(&vectors[..n]);
+        vectors[..n].iter_mut().for_each(|x| *x /= whole);
         Ok(Self { n, vectors, column: vec![0.0; size + 1], spare: vec![0.0; size + 1] })
     }
 
@@ -124,7 +135,7 @@ impl Basis {
         if let Some(p) = next.iter().position(|x| !x.is_finite()) {
             return Err(Error::from(LinearError::Value { value: next[p] }).at(p));
         }
-        let whole = length(next);
+        let whole = norm(next);
         self.column.fill(0.0);
         // Twice is enough.
         for _ in 0..2 {
@@ -134,7 +145,7 @@ impl Basis {
                 *column += along;
             }
         }
-        let left = length(next);
+        let left = norm(next);
         if left > 16.0 * f64::EPSILON * whole * (n as f64).sqrt() {
             next.iter_mut().for_each(|x| *x /= left);
             self.column[j + 1] = left;
@@ -155,8 +166,4 @@ impl Basis {
         }
         self.vectors.copy_within(size * n..(size + 1) * n, kept * n);
     }
-}
-
-fn length(x: &[f64]) -> f64 {
-    x.iter().map(|x| x * x).sum::<f64>().sqrt()
 }

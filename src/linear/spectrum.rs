@@ -1,12 +1,13 @@
 //! Where the eigenvalues of an operator lie: the rightmost and the largest, estimated from products.
 
-use nalgebra::{Complex, DMatrix};
+use nalgebra::DMatrix;
 
-use super::invariant::eigenvalues;
+use super::invariant::{condition, eigenvalues};
 use super::krylov::Search;
 use super::norm::norm;
 use crate::apply::Apply;
 use crate::error::{Error, LinearError, Result};
+use crate::particles::reserved;
 
 /// Estimates the rightmost eigenvalue max Re(lambda) and the spectral radius max |lambda| of a linear map u -> A u, from
 /// products with A alone: stored rows, an operator without weights, a sum of both, or what boundary conditions leave of
@@ -49,6 +50,15 @@ pub struct SpectrumEstimator {
     dense: usize,
 }
 
+/// An abscissa below this, over the radius, is rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// One below this may be what rounding tears two or three equal eigenvalues apart by.
+const TORN: f64 = 1e-4;
+
+/// Roundings of a matrix and of its eigenvalues, in eps of its norm.
+const ROUNDED: f64 = 64.0;
+
 /// du = A u; one type for all maps, so that a program holds the search once.
 type Product<'a> = dyn FnMut(&[f64], &mut [f64]) -> Result<()> + 'a;
 
@@ -62,6 +72,9 @@ pub struct Spectrum {
     pub frequency: f64,
     /// |A x - lambda x| of its unit vector x; the rounding of the matrix where all eigenvalues were found.
     pub residual: f64,
+    /// How far residual and rounding let that eigenvalue be off: far more where another one has nearly the same eigenvector.
+    /// Where all eigenvalues were found it is 0 but for abscissas up to 1e-4 of the radius, which rounding may make of 0.
+    pub error: f64,
     /// max |lambda|, from below unless exact.
     pub radius: f64,
     /// Products with A.
@@ -76,7 +89,7 @@ pub struct Spectrum {
 impl Default for Spectrum {
     fn default() -> Self {
         let (converged, exact) = (true, true);
-        Self { abscissa: 0.0, frequency: 0.0, residual: 0.0, radius: 0.0, applies: 0, converged, exact }
+        Self { abscissa: 0.0, frequency: 0.0, residual: 0.0, error: 0.0, radius: 0.0, applies: 0, converged, exact }
     }
 }
 
@@ -157,7 +170,7 @@ impl SpectrumEstimator {
     /// # Errors
     /// Those of `apply`; [`LinearError::Value`] naming the first entry of a product that is not finite;
     /// [`LinearError::NotConverged`] where the eigenvalues of the small matrix are not found;
-    /// [`ParticleError::Memory`](crate::ParticleError::Memory) where m + 1 vectors do not fit.
+    /// [`ParticleError::Memory`](crate::ParticleError::Memory) where m + 1 vectors, or the matrix, do not fit.
     pub fn estimate(&self, n: usize, mut apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<Spectrum> {
         self.found(n, &mut apply)
     }
@@ -175,11 +188,13 @@ impl SpectrumEstimator {
     }
 
     /// The same of a map whose eigenvalues do not crowd the imaginary axis, as that of diffusion: there runs that converge find
-    /// the rightmost, at n = 625 in a thirtieth of the time that all eigenvalues take, which are found where they do not.
+    /// the rightmost, at n = 625 in a thirtieth of the time that all eigenvalues take. These are found where no run converges,
+    /// and where growth is within the error of the run, as where an eigenvalue 0 of two has one eigenvector.
     pub(crate) fn settle(&self, n: usize, mut apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<Spectrum> {
         if n > 0 && self.is_exact(n) {
             let found = self.runs(n, &mut apply);
-            if found.as_ref().is_ok_and(|spectrum| spectrum.converged) {
+            let settled = |found: &Spectrum| !(ROUNDING * found.radius..=found.error).contains(&found.abscissa);
+            if found.as_ref().is_ok_and(|found| found.converged && settled(found)) {
                 return found;
             }
         }
@@ -195,6 +210,7 @@ impl SpectrumEstimator {
             abscissa: rightmost.value.re,
             frequency: rightmost.value.im.abs(),
             residual: rightmost.residual,
+            error: rightmost.error,
             radius: largest.value.norm().max(rightmost.value.norm()),
             applies: largest.applies + rightmost.applies,
             converged: rightmost.converged,
@@ -206,6 +222,8 @@ impl SpectrumEstimator {
 /// The spectrum from all eigenvalues of the matrix, whose columns are the products with unit vectors; `None` where they are
 /// not found.
 fn all(n: usize, apply: &mut impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<Option<Spectrum>> {
+    // Room for the matrix, and for what the search for its eigenvalues takes beside it.
+    let _: Vec<f64> = reserved(n.saturating_mul(n).saturating_mul(8))?;
     let (mut matrix, mut unit) = (DMatrix::zeros(n, n), vec![0.0; n]);
     for (q, mut column) in matrix.column_iter_mut().enumerate() {
         unit[q] = 1.0;
@@ -216,10 +234,13 @@ fn all(n: usize, apply: &mut impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Re
         }
     }
     let residual = f64::EPSILON * norm(matrix.as_slice());
-    let Some(values) = eigenvalues(&matrix) else { return Ok(None) };
-    let further = |a: Complex<f64>, b: &Complex<f64>| if b.re > a.re { *b } else { a };
-    let rightmost = values.iter().fold(values[0], further);
+    let Some((values, form)) = eigenvalues(&matrix) else { return Ok(None) };
+    let first = (0..n).fold(0, |first, i| if values[i].re > values[first].re { i } else { first });
+    let rightmost = values[first];
     let radius = values.iter().fold(0.0, |radius: f64, value| radius.max(value.norm()));
     let (abscissa, frequency) = (rightmost.re, rightmost.im.abs());
-    Ok(Some(Spectrum { abscissa, frequency, residual, radius, applies: n, converged: true, exact: true }))
+    let doubtful = abscissa > ROUNDING * radius && abscissa <= TORN * radius;
+    let error = if doubtful { ROUNDED * residual * condition(&form, first) } else { 0.0 };
+    let (applies, converged, exact) = (n, true, true);
+    Ok(Some(Spectrum { abscissa, frequency, residual, error, radius, applies, converged, exact }))
 }

@@ -102,7 +102,7 @@ impl<const D: usize> Nearest<D> {
             let mut level = cells(reach)?;
             if guessed {
                 // All that is open, searched in cells far too large, would be pairs of everybody.
-                let sample = open.iter().step_by(open.len() / SAMPLE + 1);
+                let sample = (0..open.len().min(SAMPLE)).map(|i| &open[spread(i, open.len())]);
                 let nearest = sample.filter_map(|&p| search.distance(&level, p)).filter(|&d| d > 0.0);
                 let least = (nearest.fold(level.reach(), f64::min) * SHELL).max(LENGTH_LOW);
                 // Served is at least the one that is so near.
@@ -164,6 +164,14 @@ impl<const D: usize> Search<D> {
         let (_, last, _) = self.distances.select_nth_unstable_by(self.k - 1, f64::total_cmp);
         Some(last.sqrt())
     }
+}
+
+/// Entry number i of a sample from `count`: multiples of the golden ratio, since a stride may be in step with how the targets
+/// are ordered.
+fn spread(i: usize, count: usize) -> usize {
+    const RATIO: u64 = 0x9e37_79b9_7f4a_7c15;
+    let turn = (i as u64).wrapping_mul(RATIO);
+    ((u128::from(turn) * count as u128) >> 64) as usize
 }
 
 /// The widest legal cutoff that can still find a neighbor.
@@ -230,5 +238,29 @@ impl<const D: usize> Neighbors<D> for Nearest<D> {
 
     fn count(&self, p: usize, cutoff: f64) -> usize {
         self.level(cutoff).map_or(0, |level| level.count(p, cutoff))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::particles::Random;
+
+    #[test]
+    fn samples_see_a_dense_cluster_however_the_particles_are_ordered() {
+        // Every second, fifth or fiftieth particle lies in a wide cluster, the others in a narrow one. A sample in step with
+        // that would see one of them.
+        for every in [2, 5, 50] {
+            for count in [4000, 4160, 6400, 6450] {
+                let mut random = Random::new(5);
+                let mut point = |x: f64, size: f64| [x + size * random.uniform(), size * random.uniform()];
+                let wide = |i: usize| i.is_multiple_of(every);
+                let points = (0..count).map(|i| if wide(i) { point(0.3, 0.1) } else { point(0.8, 1e-6) }).collect();
+                let nearest = Nearest::build(&Particles::new(points).unwrap(), &Domain::open(), 8).unwrap();
+                let narrow = (0..count).filter(|&p| !wide(p)).map(|p| nearest.cutoff(p)).fold(0.0, f64::max);
+                let reach = nearest.level(narrow).unwrap().reach();
+                assert!(reach <= 8.0 * narrow, "cells of {reach} for {narrow}, {count} by {every}");
+            }
+        }
     }
 }

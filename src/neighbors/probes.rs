@@ -6,8 +6,9 @@ use crate::domain::{Domain, Face};
 use crate::error::{ParticleError, Result};
 use crate::scale::Cutoff;
 
-/// Probes of a domain without open faces lie all over it. In any other they lie between particles of each cell of one cutoff
-/// and of the cells around it, as densely as these: what is far away changes nothing.
+/// Probes of a domain without open faces lie all over it. In any other they lie between particles, images too, of each cell of
+/// one cutoff and of the cells around it, as densely as these. Cells are counted from the first particle on: what else is far
+/// away changes nothing.
 pub(super) fn probes<const D: usize>(points: &[[f64; D]], domain: &Domain<D>, cutoff: Cutoff) -> Result<Vec<[f64; D]>> {
     let mut probes = Vec::new();
     if domain.faces().iter().flatten().all(|face| *face != Face::Open) {
@@ -15,11 +16,12 @@ pub(super) fn probes<const D: usize>(points: &[[f64; D]], domain: &Domain<D>, cu
         return Ok(probes);
     }
     let Some(origin) = points.first() else { return Ok(probes) };
-    for (cell, block) in blocks(points, origin, cutoff.0) {
+    let (lower, upper) = (domain.lower(), domain.upper());
+    for (cell, block) in blocks(points, domain, origin, cutoff.0) {
         // A place with particles all around it is within the box of those of its block.
         let face = |axis: usize, side: i64| origin[axis] + cell[axis].saturating_add(side) as f64 * cutoff.0;
-        let low = std::array::from_fn(|axis| block.low[axis].max(face(axis, 0)));
-        let high = std::array::from_fn(|axis| block.high[axis].min(face(axis, 1)));
+        let low = std::array::from_fn(|axis| block.low[axis].max(face(axis, 0)).max(lower[axis]));
+        let high = std::array::from_fn(|axis| block.high[axis].min(face(axis, 1)).min(upper[axis]));
         if (0..D).all(|axis| low[axis] <= high[axis]) {
             let share = |axis: usize| match block.high[axis] - block.low[axis] {
                 0.0 => 1.0,
@@ -53,13 +55,21 @@ impl<const D: usize> Block<D> {
     }
 }
 
-/// The blocks of all cells with a particle in them or beside them, by the numbers of the cells.
-fn blocks<const D: usize>(points: &[[f64; D]], origin: &[f64; D], edge: f64) -> BTreeMap<[i64; D], Block<D>> {
+/// The blocks of all cells with a particle or an image in them or beside them, by the numbers of the cells.
+fn blocks<const D: usize>(
+    points: &[[f64; D]],
+    domain: &Domain<D>,
+    origin: &[f64; D],
+    edge: f64,
+) -> BTreeMap<[i64; D], Block<D>> {
     let (mut cells, mut blocks) = (BTreeMap::new(), BTreeMap::new());
     for x in points {
-        // The cast saturates: farther cells are one.
-        let cell = std::array::from_fn(|axis| ((x[axis] - origin[axis]) / edge).floor() as i64);
-        join(&mut cells, cell, &Block::of(x));
+        domain.for_images(x, edge, |image| {
+            let x = domain.position(image, x);
+            // The cast saturates: farther cells are one.
+            let cell = std::array::from_fn(|axis| ((x[axis] - origin[axis]) / edge).floor() as i64);
+            join(&mut cells, cell, &Block::of(&x));
+        });
     }
     for (cell, own) in &cells {
         for around in 0..3_usize.pow(D as u32) {

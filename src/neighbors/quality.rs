@@ -39,7 +39,8 @@ pub struct SetQuality {
     /// A particle at that gap.
     pub closest: Option<usize>,
     /// The largest hole, as [`fill_distance`](crate::fill_distance) measures it from about two probes a particle, which lie
-    /// where particles are within the cutoff of each other: one far away changes nothing. Infinite where a probe of a domain
+    /// where particles or their images are within the cutoff of each other, in cells counted from the first particle on: any
+    /// other that is far away changes nothing. Infinite where a probe of a domain
     /// without open faces has nobody within the cutoff, and where no probe has particles all around it.
     pub fill: f64,
     /// The particle nearest to the middle of that hole; `None` where it is infinite.

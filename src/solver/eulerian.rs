@@ -52,6 +52,8 @@ pub struct Eulerian<const D: usize, S: Scene<D>, St> {
     start: Vec<f64>,
     t: f64,
     work: Vec<S::Value>,
+    /// Whether the stepper has taken a step of the one on trial.
+    stepped: bool,
 }
 
 impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
@@ -92,8 +94,8 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
             stepper.check_symmetry(discrete.symmetry())?;
         }
         let (estimated, sharp) = (limits.rate(Limit::Advection).fastest(), Vec::new());
-        let (start, t, work) = (Vec::new(), 0.0, Vec::new());
-        Ok(Self { discrete, stepper, steps, growth, estimated, sharp, ledger, start, t, work })
+        let (start, t, work, stepped) = (Vec::new(), 0.0, Vec::new(), false);
+        Ok(Self { discrete, stepper, steps, growth, estimated, sharp, ledger, start, t, work, stepped })
     }
 
     /// Sets what happens to a step above the limit.
@@ -132,8 +134,8 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         self.t
     }
 
-    /// The longest legal step from here: infinite without a limit. Where flow or source depend on time, one that is legal at
-    /// both its ends, and no longer than the limit at its start.
+    /// The longest legal step from here: infinite where nothing limits it now. Where flow or source depend on time, one that
+    /// is legal at both its ends, and no longer than the limit at its start.
     ///
     /// # Errors
     /// As [`limits`](Self::limits).
@@ -271,13 +273,15 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
         } else {
             let mut work = std::mem::take(&mut self.work);
             work.clone_from(u);
+            self.stepped = false;
             let done =
                 if whole { self.substep(&mut work, self.t, dt).map(|()| 1) } else { self.cut(&mut work, dt, limits) };
             let done = done
                 .and_then(|substeps| self.drifted(&work, start.as_deref().unwrap_or(&self.start)).map(|()| substeps));
             if done.is_ok() {
                 std::mem::swap(u, &mut work);
-            } else {
+            } else if self.stepped {
+                // A step of its own that fails leaves a stepper as it was.
                 self.stepper.reset();
             }
             self.work = work;
@@ -331,7 +335,8 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     fn substep(&mut self, u: &mut Vec<S::Value>, t: f64, dt: f64) -> Result<()> {
         let Self { discrete, stepper, .. } = self;
         stepper.step(t, dt, u, discrete)?;
-        discrete.impose(t + dt, u)
+        self.stepped = true;
+        self.discrete.impose(t + dt, u)
     }
 
     /// Cuts a step into substeps, and says how many.

@@ -12,7 +12,7 @@ use crate::linear::{Spectrum, SpectrumEstimator};
 /// by, if that is more.
 const LIMIT: f64 = 1e-8;
 
-/// How far right of the spectrum estimates amid the imaginary axis end that are not exact, over the radius; their residual
+/// How far right of the spectrum estimates amid the imaginary axis end that are not exact, over the radius; their error
 /// where that is less.
 const RESOLUTION: f64 = 0.002;
 
@@ -88,11 +88,11 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
 fn recorded<E: Fields>(spectrum: &Spectrum, settled: bool, policy: GrowthPolicy) -> Result<f64> {
     let (rate, radius, limit) = (spectrum.abscissa, spectrum.radius, legal::<E>());
     // What the residual leaves open is no proof of growth, but estimates that did not converge are good to this too.
-    let open = if spectrum.exact { 0.0 } else { spectrum.residual.min(RESOLUTION * radius) };
+    let open = spectrum.error.min(RESOLUTION * radius);
     match (rate - open > limit * radius, policy) {
         (true, GrowthPolicy::Refuse) => Err(SolverError::Growing { rate, radius, limit }.into()),
         (true, _) => Ok(rate),
-        (false, _) => Ok(if settled { rate } else { f64::NAN }),
+        (false, _) => Ok(if settled && rate <= limit * radius { rate } else { f64::NAN }),
     }
 }
 

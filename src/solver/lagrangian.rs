@@ -243,8 +243,8 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
         Ok(self.limits_of(self.t, 0.0, None)?.0)
     }
 
-    /// The longest legal step from here: infinite without a limit. Where flow or source depend on time, one that is legal at
-    /// both its ends, and no longer than the limit at its start.
+    /// The longest legal step from here: infinite where nothing limits it now. Where flow or source depend on time, one that
+    /// is legal at both its ends, and no longer than the limit at its start.
     ///
     /// # Errors
     /// As [`limits`](Self::limits).

@@ -4,7 +4,7 @@ use super::fields::Fields;
 use super::policy::GrowthPolicy;
 use super::scene::Scene;
 use super::semi_discrete::SemiDiscrete;
-use crate::error::{Error, Result, SolverError};
+use crate::error::{Error, LinearError, Result, SolverError};
 use crate::linear::{CsrMatrix, SolveReport, SparseSolver};
 use crate::neighbors::Neighbors;
 use crate::particles::Particles;
@@ -26,7 +26,8 @@ pub struct SteadyState<E> {
 ///
 /// By [`SparseSolver`]: sparse LU with the feature `faer`, otherwise GMRES. S and the boundary values are those of t = 0. A
 /// source of one field may be affine in u, S = a + b u, and b goes into the matrix; one of several fields may not depend
-/// on u. That S is so is checked where it is probed, and again at the field found. Without a boundary, or with fluxes alone, nothing fixes the level of u unless the source decays.
+/// on u. That S is so is checked where it is probed, and again at the field found, to 64 eps of |S(0)| + |b u|: one that is a
+/// small difference of large terms, c - (c + u), may be refused. Without a boundary, or with fluxes alone, nothing fixes the level of u unless the source decays.
 ///
 /// ```
 /// use parops::{AdvectionDiffusion, Boundary, BoundaryCondition, DcPse, Domain, Gradient, Laplacian, Nearest, Particles};
@@ -81,6 +82,12 @@ pub fn steady<const D: usize, S: Scene<D>, P: Neighbors<D>>(
         report.residual = report.residual.max(solved.residual);
         u.iter_mut().zip(&x).for_each(|(u, x)| u.set(i, *x));
     }
+    for (p, u) in u.iter().enumerate() {
+        // Beyond the range of f32, it may be.
+        if let Some(value) = (0..S::Value::FIELDS).map(|i| u.get(i)).find(|value| !value.is_finite()) {
+            return Err(Error::from(LinearError::Value { value }).at(p));
+        }
+    }
     source.confirm(&discrete, &u)?;
     Ok(SteadyState { u, report, condition: solver.condition()? })
 }
@@ -125,7 +132,8 @@ impl<E: Fields> Affine<E> {
             for power in (0..f64::MAX_EXP).step_by(STRIDE) {
                 let unit = 2.0_f64.powi(power);
                 let ((_, once), (filled, twice)) = (at(unit), at(2.0 * unit));
-                if !filled.finite() {
+                // Beyond the range of the source what is known by then must do: it is held to the field found.
+                if !filled.finite() || power > 0 && !(once.finite() && twice.finite()) {
                     break;
                 }
                 let change = once.get(0) - offset.get(0);

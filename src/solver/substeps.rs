@@ -8,12 +8,13 @@ use crate::error::{Limit, Result, SolverError};
 pub(super) fn longest(mut limit: impl FnMut(f64) -> Result<f64>) -> Result<f64> {
     let mut dt = limit(0.0)?;
     for turn in 0.. {
-        let found = if dt > 0.0 && dt.is_finite() { limit(dt)? } else { dt };
+        // Flow or coefficients may not be defined so far ahead.
+        let found = if dt > 0.0 && dt.is_finite() { limit(dt).unwrap_or(0.5 * dt) } else { dt };
         if !(found < dt) {
             break;
         }
-        // Limits change with time, but not at once: a step short enough is legal.
-        dt = if turn < TURNS { found } else { 0.5 * dt };
+        // Limits change with time, but not at once: a step short enough is legal. What binds far ahead need not bind here.
+        dt = if turn < TURNS { found.max(0.5 * dt) } else { 0.5 * dt };
     }
     Ok(dt)
 }

@@ -4,8 +4,8 @@ use crate::cases::cases;
 use crate::dense;
 use crate::properties::properties;
 use parops::{
-    Allowance, Along, Apply, CellList, CsrMatrix, DcPse, Domain, ErrorKind, Laplacian, LinearError, Nearest, Particles,
-    Pse, Result, Rows, Sign, Spectrum, SpectrumEstimator, testing::Promise,
+    Allowance, Along, Apply, CellList, CsrMatrix, DcPse, Domain, ErrorKind, Laplacian, LinearError, Nearest,
+    ParticleError, Particles, Pse, Result, Rows, Sign, Spectrum, SpectrumEstimator, testing::Promise,
 };
 use proptest::prelude::*;
 
@@ -164,13 +164,38 @@ fn maps_of_no_entry_or_no_size_have_a_spectrum_of_zero() {
 }
 
 #[test]
+fn matrix_that_does_not_fit_is_refused() {
+    let all = SpectrumEstimator::new().dense(usize::MAX).most(usize::MAX);
+    let error = all.estimate(3_000_000, |_, _| Ok(())).unwrap_err();
+    assert!(matches!(error.kind(), ErrorKind::Particle(ParticleError::Memory { .. })), "{error}");
+}
+
+#[test]
+fn error_of_an_eigenvalue_is_that_of_its_eigenvector_too() -> Result<()> {
+    // One eigenvalue -1 of two with one eigenvector, and others further left: found to the root of the residual.
+    let n = 200;
+    let diagonal = (0..n).map(|i: usize| (i, i, -1.0 - 0.02 * i.saturating_sub(1) as f64));
+    let entries = diagonal.chain([(0, 1, 0.5)]).map(|(i, j, a)| (j, i, a)).collect::<Vec<_>>();
+    let matrix = CsrMatrix::from_triplets(n, n, entries)?;
+    let found = SpectrumEstimator::new().dense(0).of(&matrix)?;
+    let off = (found.abscissa + 1.0).hypot(found.frequency);
+    assert!(found.converged && off <= found.error && found.error >= 1e3 * found.residual, "{off} {found:?}");
+    assert!(found.error <= 1e-3 * found.radius, "{found:?}");
+    // Without that entry an eigenvalue is as good as its residual.
+    let matrix = CsrMatrix::from_triplets(n, n, (0..n).map(|i| (i, i, -1.0 - 0.02 * i as f64)))?;
+    let found = SpectrumEstimator::new().dense(0).of(&matrix)?;
+    assert!((found.abscissa + 1.0).abs() <= found.error.max(1e-12) && found.error <= 1e-7, "{found:?}");
+    Ok(())
+}
+
+#[test]
 fn estimates_are_repeated_bit_for_bit_and_scale_with_the_operator() {
     let set = Particles::jittered([0.0; 2], [1.0; 2], [SIDE; 2], 0.3, 5).unwrap();
     let rows = advection(&set, Sign::Minus, 14).unwrap();
     for estimator in [SpectrumEstimator::new(), SpectrumEstimator::new().dense(0)] {
         let found = estimator.of(&rows).unwrap();
         assert_eq!(found, estimator.of(&rows).unwrap());
-        for scale in [2.0_f64.powi(300), 2.0_f64.powi(-300)] {
+        for scale in [300, 650, 900, -300, -650, -900].map(|power| 2.0_f64.powi(power)) {
             let scaled = estimator.estimate(rows.targets(), |u, du| {
                 rows.apply(u, du)?;
                 du.iter_mut().for_each(|du| *du *= scale);

@@ -107,6 +107,22 @@ fn fill_of_an_open_set_is_that_of_its_holes_whatever_lies_far_away() {
 }
 
 #[test]
+fn fill_sees_a_hole_across_a_face_beside_an_open_one() {
+    // Two columns of a lattice are missing, in the middle or at the faces.
+    let lattice = Particles::lattice([0.0; 2], [1.0; 2], [20; 2]).unwrap();
+    let fill = |columns: [usize; 2], face: Face| {
+        let column = |p: usize| (20.0 * lattice.points()[p][0]) as usize;
+        let kept = (0..400).filter(|&p| !columns.contains(&column(p))).map(|p| lattice.points()[p]).collect();
+        let domain = Domain::new([0.0; 2], [1.0; 2], [[face; 2], [Face::Open; 2]]).unwrap();
+        SetQuality::measure(&Particles::new(kept).unwrap(), &domain, Cutoff(0.2)).unwrap().fill
+    };
+    let hole = 1.5_f64.hypot(0.5) / 20.0;
+    for found in [fill([9, 10], Face::Periodic), fill([0, 19], Face::Periodic), fill([0, 19], Face::MirrorEven)] {
+        assert!(found <= hole + EPS && found >= hole - 0.5 / 20.0, "{found} of {hole}");
+    }
+}
+
+#[test]
 fn fill_is_never_zero_where_nothing_was_probed() {
     let measure = |points: &[[f64; 2]], cutoff: f64| {
         SetQuality::measure(&Particles::new(points.to_vec()).unwrap(), &Domain::open(), Cutoff(cutoff)).unwrap()

@@ -1,5 +1,6 @@
 //! Eulerian runs that fail: one typed error with its numbers, and everything as it was; and what the policies allow.
 
+use std::f64::consts::TAU;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -253,5 +254,43 @@ fn growing_modes_are_refused_unless_allowed_and_then_recorded() -> Result<()> {
     let unknown = GrowthPolicy::Unknown;
     let run = Eulerian::with_policy(scene(), &particles, &neighbors, Rk4::new(), steps, unknown)?;
     assert!(run.ledger().growth.is_nan());
+    Ok(())
+}
+
+#[test]
+fn stepper_remembers_through_a_step_of_its_own_that_fails() -> Result<()> {
+    let ring = Particles::lattice([0.0], [1.0], [40])?;
+    let neighbors = Nearest::build(&ring, &Domain::periodic([0.0], [1.0])?, 6)?;
+    let start: Vec<f64> = ring.points().iter().map(|x| (TAU * x[0]).sin()).collect();
+    // In place, and on trial since a budget is held. The source is no number when it is asked for so many times late.
+    for budget in [f64::INFINITY, 1e9] {
+        let run = |wrong: usize| {
+            let calls = AtomicUsize::new(0);
+            let scene = AdvectionDiffusion::<1>::new().advection([1.0], DcPse::<Gradient<1>, 2>::new()).source(
+                move |_: &[f64; 1], t: f64, _: f64| {
+                    let now = t > 0.095 && calls.fetch_add(1, Ordering::Relaxed) == wrong;
+                    if now { f64::NAN } else { t.cos() }
+                },
+            );
+            let (allow, growth) = (StepPolicy::Allow, GrowthPolicy::Allow);
+            let mut run = Eulerian::with_policy(scene, &ring, &neighbors, Leapfrog::new(), allow, growth)?;
+            if budget.is_finite() {
+                run = run.drift_budget(budget)?;
+            }
+            let (mut u, mut failed) = (start.clone(), 0);
+            while run.ledger().step < 20 {
+                failed += usize::from(run.step(&mut u, 0.01).is_err());
+            }
+            Ok::<_, parops::Error>((u, failed))
+        };
+        let ((u, none), mut once) = (run(usize::MAX)?, 0);
+        assert_eq!(none, 0);
+        for wrong in (0..1000).step_by(37) {
+            let (again, failed) = run(wrong)?;
+            assert!(u.iter().zip(&again).all(|(a, b)| a.to_bits() == b.to_bits()), "{budget}, {wrong}");
+            once += failed;
+        }
+        assert!(once > 8, "{once} steps failed");
+    }
     Ok(())
 }

@@ -5,6 +5,7 @@ mod dense;
 mod divergence;
 mod eulerian;
 mod eulerian_faults;
+mod eulerian_growth;
 mod eulerian_ledger;
 mod eulerian_limits;
 mod eulerian_order;

@@ -1,8 +1,8 @@
 //! Sources of steady scenes: affine ones at any level of the field, others refused wherever they are not affine.
 
 use parops::{
-    AdvectionDiffusion, Boundary, BoundaryCondition, DcPse, Domain, ErrorKind, Laplacian, Nearest, Particles, Result,
-    SolverError, steady,
+    AdvectionDiffusion, Boundary, BoundaryCondition, DcPse, Domain, ErrorKind, Laplacian, LinearError, Nearest,
+    Particles, Result, SolverError, steady,
 };
 
 const CELLS: usize = 100;
@@ -53,4 +53,31 @@ fn sources_that_are_not_affine_are_refused_at_any_level() {
     // Affine where it is probed, and not where the field comes to lie.
     let u = refused(&|u: f64| 1.0 - u.min(4.0), 10.0);
     assert!(u > 4.0 && u <= 10.0, "{u}");
+}
+
+#[test]
+fn affine_sources_are_solved_though_they_overflow_far_from_the_field() -> Result<()> {
+    // Heat everywhere and a loss whose factors are taken one after the other: u -> inf * 0 beyond the range.
+    for (loss, factor) in [(1e-6, 4.2e6), (1e-3, 1e3), (0.0, 1e6)] {
+        let u = rod(|u| 1.0 - loss * (factor * u), 0.0)?;
+        let k = f64::sqrt(loss * factor);
+        let middle = if k == 0.0 { 0.125 } else { (1.0 - 1.0 / (0.5 * k).cosh()) / (k * k) };
+        assert!((u[CELLS / 2] / middle - 1.0).abs() < 1e-5, "{} for {middle}", u[CELLS / 2]);
+    }
+    Ok(())
+}
+
+#[test]
+fn field_beyond_the_range_of_its_numbers_is_said_to_be() -> Result<()> {
+    let rod = Particles::new((0..=10_u8).map(|i| [f64::from(i) / 10.0]).collect())?;
+    let ends = Boundary::new(2).conditions([0, 10].map(BoundaryCondition::dirichlet));
+    let scene = AdvectionDiffusion::<1>::new()
+        .fields::<f32>()
+        .diffusion(1e-15, DcPse::<Laplacian<1>, 2>::new())
+        .source(|_, _, _: f32| 1e30)
+        .boundary(ends, |_, _, _| 0.0);
+    let error = steady(scene, &rod, &Nearest::build(&rod, &Domain::open(), 5)?).unwrap_err();
+    assert!(matches!(error.kind(), ErrorKind::Linear(LinearError::Value { value }) if value.is_infinite()), "{error}");
+    assert_eq!(error.particle(), Some(1), "{error}");
+    Ok(())
 }
