@@ -8,8 +8,14 @@ use crate::error::{Limit, Result, SolverError};
 pub(super) fn longest(mut limit: impl FnMut(f64) -> Result<f64>) -> Result<f64> {
     let mut dt = limit(0.0)?;
     for turn in 0.. {
-        // Flow or coefficients may not be defined so far ahead.
-        let found = if dt > 0.0 && dt.is_finite() { limit(dt).unwrap_or(0.5 * dt) } else { dt };
+        if !(dt > 0.0 && dt.is_finite()) {
+            break;
+        }
+        let found = match limit(dt) {
+            // Flow or coefficients may not be defined so far ahead.
+            Err(_) if turn < FARTHEST => 0.5 * dt,
+            found => found?,
+        };
         if !(found < dt) {
             break;
         }
@@ -21,6 +27,8 @@ pub(super) fn longest(mut limit: impl FnMut(f64) -> Result<f64>) -> Result<f64> 
 
 /// Steps that are tried before they are halved.
 const TURNS: usize = 8;
+/// Steps after which what cannot be evaluated is no matter of how far ahead.
+const FARTHEST: usize = 64;
 
 /// What is left of a step.
 pub(super) struct Substeps {

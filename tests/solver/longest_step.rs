@@ -114,5 +114,10 @@ fn longest_step_looks_no_further_than_flow_and_source_are_defined() -> Result<()
         assert!(dt > 1.0 && dt < 100.0, "{dt}");
         run.step(&mut u, dt)?;
     }
+    // What is not defined at any later time is an error.
+    let scene = AdvectionDiffusion::<2>::new().advection(|_: &[f64; 2], t: f64| [(-t).sqrt() + 1.0, 0.0], upwind);
+    let mut run = Eulerian::new(scene, &set, &neighbors, Rk4::new())?;
+    let error = run.longest_step(&vec![1.0; set.len()]).unwrap_err();
+    assert!(matches!(error.kind(), ErrorKind::Solver(SolverError::Velocity { .. })), "{error}");
     Ok(())
 }
