@@ -131,13 +131,13 @@ fn in_triangle(t: &DMatrix<C>, i: usize) -> f64 {
         if sum == zero { zero } else { sum * apart.conj() / apart.norm_sqr() }
     };
     // T x = lambda x ends at i, y* T = lambda y* begins there; both are 1 there, and their product is.
-    let (mut x, mut y) = (vec![zero; i + 1], vec![one]);
+    let (mut x, mut y) = (vec![zero; i + 1], vec![one; t.ncols() - i]);
     x[i] = one;
     for j in (0..i).rev() {
         x[j] = entry((j + 1..=i).fold(zero, |sum, k| sum + t[(j, k)] * x[k]), j);
     }
     for j in i + 1..t.ncols() {
-        y.push(entry((i..j).fold(zero, |sum, k| sum + y[k - i] * t[(k, j)]), j));
+        y[j - i] = entry((i..j).fold(zero, |sum, k| sum + y[k - i] * t[(k, j)]), j);
     }
     let size = |z: &[C]| z.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt();
     let condition = size(&x) * size(&y);

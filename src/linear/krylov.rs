@@ -81,17 +81,20 @@ impl Search {
             let value = ordered.values[0];
             radius = ordered.values.iter().fold(radius, |radius, value| radius.max(value.norm()));
             let residual = beta * ordered.last_of_first();
-            // Products round, too.
-            let error = MARGIN * residual.max(ROUNDED * radius) * ordered.condition_of_first();
             let unit = self.tolerance * radius;
             steady = if key(value) - before <= unit { steady + 1 } else { 0 };
             before = key(value);
             let converged = beta == 0.0 || (residual <= unit && steady >= STEADY);
+            let found = || {
+                // Products round, too.
+                let error = MARGIN * residual.max(ROUNDED * radius) * ordered.condition_of_first();
+                Ok(Foremost { value, residual, error, applies, converged })
+            };
             if converged || applies >= self.most || full < size || size < 4 {
-                return Ok(Foremost { value, residual, error, applies, converged });
+                return found();
             }
             let Some(turn) = ordered.basis((size / 3).max(2)).filter(|turn| turn.ncols() < size) else {
-                return Ok(Foremost { value, residual, error, applies, converged });
+                return found();
             };
             kept = turn.ncols();
             let small = turn.transpose() * &part * &turn;
