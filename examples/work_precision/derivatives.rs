@@ -133,7 +133,7 @@ fn sides(quick: bool, set: Set, dim: usize, method: &str, order: u32) -> &'stati
             }
         }
         (false, _, "PSE" | "SPH") if set == Set::Lattice => &[18, 24],
-        (true, _, "DC-PSE") if set == Set::Lattice => &[12],
+        (true, _, "DC-PSE") if set == Set::Lattice && order < 8 => &[12],
         (true, ..) if thin || order > 4 => &[],
         (true, ..) => &[12],
         (false, ..) if thin => &[20],
