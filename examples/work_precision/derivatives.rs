@@ -125,13 +125,8 @@ fn sides(quick: bool, set: Set, dim: usize, method: &str, order: u32) -> &'stati
         (true, 2, _) => &[24, 40],
         (false, 2, _) if thin => &[32, 40, 56, 80],
         (false, 2, _) => &[28, 40, 56, 80],
-        (true, _, "PSE" | "SPH") if set == Set::Lattice => {
-            if order < 4 {
-                &[18]
-            } else {
-                &[]
-            }
-        }
+        (true, _, "PSE" | "SPH") if set == Set::Lattice && order < 4 => &[18],
+        (true, _, "PSE") if set == Set::Lattice => &[],
         (false, _, "PSE" | "SPH") if set == Set::Lattice => &[18, 24],
         (true, _, "DC-PSE") if set == Set::Lattice && order < 8 => &[12],
         (true, ..) if thin || order > 4 => &[],

@@ -27,7 +27,8 @@ pub struct SteadyState<E> {
 /// By [`SparseSolver`]: sparse LU with the feature `faer`, otherwise GMRES. S and the boundary values are those of t = 0. A
 /// source of one field may be affine in u, S = a + b u, and b goes into the matrix; one of several fields may not depend
 /// on u. That S is so is checked where it is probed, and again at the field found, to 64 eps of |S(0)| + |b u|: one that is a
-/// small difference of large terms, c - (c + u), may be refused. Without a boundary, or with fluxes alone, nothing fixes the level of u unless the source decays.
+/// small difference of large terms, c - (c + u), may be refused. Without a boundary, or with
+/// fluxes alone, nothing fixes the level of u unless the source decays.
 ///
 /// ```
 /// use parops::{AdvectionDiffusion, Boundary, BoundaryCondition, DcPse, Domain, Gradient, Laplacian, Nearest, Particles};
