@@ -34,7 +34,7 @@ use std::time::Instant;
 
 use options::Options;
 use record::Record;
-use runs::{Method, Solved};
+use runs::{Gammas, Method, Solved};
 
 fn main() -> ExitCode {
     options::run("advection_diffusion_2d", solve_all)
@@ -46,12 +46,13 @@ const SHOWN: usize = 40;
 /// Runs all methods on all sets; whether every claim holds.
 fn solve_all(options: &Options) -> Result<bool, Box<dyn Error>> {
     let sides: &[usize] = if options.quick { &[25, 30, SHOWN] } else { &[25, 30, SHOWN, 50, 60, 80, 100] };
+    let gammas = Gammas::find()?;
     let (mut records, mut shown) = (Vec::new(), Vec::new());
     println!("{}", Record::TITLE);
     for method in Method::ALL {
         for &n in sides {
             let clock = Instant::now();
-            let solved = runs::solve(method, n)?;
+            let solved = runs::solve(method, n, &gammas)?;
             let record = solved.record(clock.elapsed().as_secs_f64()).ok_or("a run without a step")?;
             println!("{}", record.row());
             records.push(record);

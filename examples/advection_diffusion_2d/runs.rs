@@ -79,7 +79,7 @@ fn torus() -> Result<Domain<2>> {
 }
 
 /// The scene with n particles along an axis.
-pub fn solve(method: Method, n: usize) -> Result<Solved> {
+pub fn solve(method: Method, n: usize, gammas: &Gammas) -> Result<Solved> {
     match method {
         Method::Upwind => {
             let set = scattered(n)?;
@@ -89,8 +89,8 @@ pub fn solve(method: Method, n: usize) -> Result<Solved> {
             // Of the many neighbors of the upwind rows the window takes the nearest.
             fixed(method, n, &set, &cells, DcPse::<Laplacian<2>, 2>::new().epsilon(h.epsilon(1.4)?), upwind)
         }
-        Method::DcPse(4) => central::<4>(method, n),
-        Method::DcPse(_) => central::<2>(method, n),
+        Method::DcPse(4) => central::<4>(method, n, gammas.fourth),
+        Method::DcPse(_) => central::<2>(method, n, gammas.second),
         Method::Moving(4) => moving(method, n, Lambda::<4, 4>::new()?),
         Method::Moving(_) => moving(method, n, Lambda::<2, 2>::new()?),
     }
@@ -108,15 +108,30 @@ fn nearest<const R: u32>(set: &Particles<2>) -> Result<Nearest<2>> {
     Nearest::build(set, &torus()?, DcPse::<Laplacian<2>, R>::new().fewest_neighbors::<2>()?)
 }
 
-fn central<const R: u32>(method: Method, n: usize) -> Result<Solved> {
-    // gamma has no unit: a small set tells it for all.
-    const COARSE: usize = 16;
-    let (set, coarse) = (scattered(n)?, scattered(COARSE)?);
-    let near = nearest::<R>(&coarse)?;
-    let (site, flow) = (Site::new(&coarse, &near)?, |p: usize| velocity(&coarse.points()[p], 0.0));
-    let gamma = stabilized::<R>(COARSE).build::<f64, _>(&site, flow, true, &near)?.gamma();
+fn central<const R: u32>(method: Method, n: usize, gamma: f64) -> Result<Solved> {
+    let set = scattered(n)?;
     let scheme = stabilized::<R>(n).gamma(gamma);
     fixed(method, n, &set, &nearest::<R>(&set)?, DcPse::<Laplacian<2>, R>::new(), scheme)
+}
+
+/// The gamma of the hyperviscosity that keeps DC-PSE from growing; it has no unit, and a small set tells it for all.
+pub struct Gammas {
+    second: f64,
+    fourth: f64,
+}
+
+impl Gammas {
+    pub fn find() -> Result<Self> {
+        Ok(Self { second: Self::of::<2>()?, fourth: Self::of::<4>()? })
+    }
+
+    fn of<const R: u32>() -> Result<f64> {
+        const COARSE: usize = 16;
+        let set = scattered(COARSE)?;
+        let near = nearest::<R>(&set)?;
+        let (site, flow) = (Site::new(&set, &near)?, |p: usize| velocity(&set.points()[p], 0.0));
+        Ok(stabilized::<R>(COARSE).build::<f64, _>(&site, flow, true, &near)?.gamma())
+    }
 }
 
 /// Particles that stay.

@@ -48,8 +48,8 @@ pub struct SteadyState<E> {
 ///
 /// # Errors
 /// As [`SemiDiscrete::new`]; [`SolverError::Unsteady`] for a velocity that depends on time; [`SolverError::NotAffine`] and
-/// [`SolverError::Source`] naming the particle; [`SolverError::OpenLevel`] where any constant may be added to u; what [`SparseSolver::new`] and [`SparseSolver::solve`] refuse, naming
-/// particles as rows.
+/// [`SolverError::Source`] naming the particle; [`SolverError::OpenLevel`] where any constant may be added to u; what
+/// [`SparseSolver::new`] and [`SparseSolver::solve`] refuse, naming particles as rows.
 pub fn steady<const D: usize, S: Scene<D>, P: Neighbors<D>>(
     scene: S,
     particles: &Particles<D>,
