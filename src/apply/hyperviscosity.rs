@@ -1,6 +1,7 @@
 //! Hyperviscosity: a power of the Laplacian that damps what advection rows let grow.
 
 use std::borrow::Borrow;
+use std::collections::BTreeMap;
 
 use super::{Apply, Field, Rows, check, scalars};
 use crate::error::{Error, LinearError, OperatorError, ParticleError, Result};
@@ -133,8 +134,7 @@ impl<L: Borrow<Rows<[f64; 1], T>>, T: Field> Hyperviscosity<L, T> {
             next.iter_mut().for_each(|x| *x *= square);
             std::mem::swap(power_of_u, next);
         }
-        let sign = if power.is_multiple_of(2) { -1.0 } else { 1.0 };
-        let factor = T::lift(sign * *gamma / *h);
+        let factor = T::lift(sign(*power) * *gamma / *h);
         let sums = du.iter().zip(power_of_u.iter()).zip(velocities).map(|((du, x), v)| *du + factor * speed(v) * *x);
         if let Some((p, value)) = sums.enumerate().find(|(_, sum)| !sum.is_finite()) {
             return Err(Error::from(crate::error::ApplyError::Overflow { value: value.as_() }).at(p));
@@ -144,6 +144,17 @@ impl<L: Borrow<Rows<[f64; 1], T>>, T: Field> Hyperviscosity<L, T> {
         }
         Ok(())
     }
+
+    /// The entries of row p of the term with gamma = 1, where the particle is that fast.
+    pub(crate) fn row(&self, p: usize, speed: f64) -> BTreeMap<usize, f64> {
+        let (factor, square) = (sign(self.power) * speed / self.h, self.h * self.h);
+        self.laplacian().power_of(p, factor, square, self.power as usize)
+    }
+}
+
+/// (-1)^(k+1).
+fn sign(power: u32) -> f64 {
+    if power.is_multiple_of(2) { -1.0 } else { 1.0 }
 }
 
 /// |v|.

@@ -1,5 +1,7 @@
 //! The pairs of one row, for sums that live outside this layer.
 
+use std::collections::BTreeMap;
+
 use super::Field;
 use super::rows::Rows;
 
@@ -40,5 +42,19 @@ impl<const K: usize, T: Field> Rows<[f64; K], T> {
             entry(q, w);
         }
         entry(p, own);
+    }
+}
+
+impl<T: Field> Rows<[f64; 1], T> {
+    /// The entries of row p of `weight` times a power of `factor` times these rows.
+    pub(crate) fn power_of(&self, p: usize, weight: f64, factor: f64, power: usize) -> BTreeMap<usize, f64> {
+        (0..power).fold(BTreeMap::from([(p, weight)]), |row, _| {
+            let mut next = BTreeMap::new();
+            for (q, weight) in row {
+                let weight = factor * weight;
+                self.entries_of(q, |[w]| weight * w, &mut |q, w| *next.entry(q).or_insert(0.0) += w);
+            }
+            next
+        })
     }
 }

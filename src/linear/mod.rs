@@ -29,3 +29,4 @@ pub use solver::SparseSolver;
 pub use spectrum::{Spectrum, SpectrumEstimator};
 pub use stop::SolveReport;
 pub use tuning::Tuning;
+pub(crate) use tuning::{OPEN, least};

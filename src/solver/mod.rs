@@ -14,6 +14,7 @@ mod attempt;
 mod carried;
 mod central;
 mod coefficient;
+mod damping;
 mod diffusion;
 mod divergence;
 mod edge;

@@ -1,15 +1,13 @@
 //! Central DC-PSE advection with hyperviscosity, for scattered particles.
 
-use std::collections::BTreeMap;
-
 use super::central::CentralRows;
+use super::damping::Damping;
 use super::fields::Fields;
 use super::limits::Rate;
 use super::term::Site;
 use super::transport::{Transport, TransportRows};
 use crate::apply::{Hyperviscosity, Report, Rows};
-use crate::error::{Error, ErrorKind, LinearError, ParticleError, Result};
-use crate::linear::SpectrumEstimator;
+use crate::error::{Error, LinearError, ParticleError, Result};
 use crate::neighbors::Neighbors;
 use crate::operator::{DcPse, Gradient, Laplacian};
 use crate::scalar::Scalar;
@@ -18,11 +16,13 @@ use crate::scale::Spacing;
 /// DC-PSE advection of order R with hyperviscosity,
 /// v . grad u - (-1)^(k+1) gamma |v| h^(2k-1) Lap^k u, k the least with 2 k - 1 >= R.
 ///
-/// Lap^k is a Laplacian of order R applied k times. gamma is found when the rows are made ([`Hyperviscosity::tune`]),
-/// unless [`gamma`](Self::gamma) gives it: up to 640 particles from all eigenvalues, as the least with which no mode grows
-/// (1e-9 |v|_max / h), or 1e-3 |v|_max / h where no gamma up to 1 does that; on larger sets from estimates, for 1e-3 with
-/// a larger margin, which is no proof. Where the flow is at rest then, it is the largest gamma that flows along the axes
-/// need. Implicit schemes and steady problems take the k-th power of the Laplacian as a matrix.
+/// Lap^k is a Laplacian of order R applied k times. gamma is found when the rows are made, unless
+/// [`gamma`](Self::gamma) gives it. Up to 640 particles: from all eigenvalues, as the least with which no mode grows
+/// (1e-9 |v|_max / h), or 1e-3 |v|_max / h where no gamma up to 1 does that, plus a quarter ([`Hyperviscosity::tune`]). On
+/// larger sets: 2.5 times what the 400 particles around the fastest one need alone for 1e-3 |v|_max / h, twice that and
+/// so on where 1000 products with all rows find more growth, which is no proof. Where the flow is at rest then, it is the
+/// largest gamma that flows along the axes need. Implicit schemes and steady problems take the k-th power of the
+/// Laplacian as a matrix.
 #[derive(Clone, Debug)]
 pub struct Stabilized<const D: usize, const R: u32> {
     gradient: DcPse<Gradient<D>, R>,
@@ -30,15 +30,6 @@ pub struct Stabilized<const D: usize, const R: u32> {
     h: Spacing,
     gamma: Option<f64>,
 }
-
-/// The growth that is left, in |v|_max / h, where eigenvalues are exact: above their rounding, below what runs refuse.
-const NONE: f64 = 1e-9;
-
-/// The same elsewhere: finer estimates do not resolve the spectrum of an advection operator.
-const GROWTH: f64 = 1e-3;
-
-/// Vectors of the estimates: growth amid the imaginary axis is missed with fewer.
-const VECTORS: usize = 64;
 
 impl<const D: usize, const R: u32> Stabilized<D, R> {
     /// The scheme for a set of spacing h.
@@ -114,26 +105,8 @@ impl<const D: usize, const R: u32> Transport<D> for Stabilized<D, R> {
                     let along = |axis| vec![std::array::from_fn(|i| f64::from(u8::from(i == axis))); count];
                     flows = (0..D).map(along).collect();
                 }
-                let mut term = Hyperviscosity::new(laplacian, R, self.h, 0.0)?;
-                let mut gamma = 0.0_f64;
-                for velocities in &flows {
-                    let bare = |u: &[f64], du: &mut [f64]| {
-                        rows.apply_along(velocities, u, du)?;
-                        du.iter_mut().for_each(|du| *du = -*du);
-                        Ok(())
-                    };
-                    let estimator = SpectrumEstimator::new().subspace(VECTORS);
-                    let found = if estimator.is_exact(count) {
-                        match term.tune(&estimator, velocities, bare, NONE) {
-                            Err(error) if grows(&error) => term.tune(&estimator, velocities, bare, GROWTH)?,
-                            found => found?,
-                        }
-                    } else {
-                        term.tune(&estimator, velocities, bare, GROWTH)?
-                    };
-                    gamma = gamma.max(found.gamma);
-                }
-                gamma
+                let mut damping = Damping { rows, term: Hyperviscosity::new(laplacian, R, self.h, 0.0)? };
+                flows.iter().try_fold(0.0, |most: f64, flow| Ok::<_, Error>(most.max(damping.gamma(flow)?)))?
             }
         };
         Ok(StabilizedRows {
@@ -180,15 +153,7 @@ impl<const D: usize, E: Fields> TransportRows<D, E> for StabilizedRows<D, E> {
 
     fn entries(&self, p: usize, v: &[f64; D], entry: &mut dyn FnMut(usize, f64)) {
         self.central.entries(p, v, entry);
-        let mut row = BTreeMap::from([(p, self.factor(v))]);
-        for _ in 0..self.power {
-            let mut next = BTreeMap::new();
-            for (q, weight) in row {
-                let square = self.h * self.h * weight;
-                self.laplacian.entries_of(q, |w| square * w[0], &mut |q, w| *next.entry(q).or_insert(0.0) += w);
-            }
-            row = next;
-        }
+        let row = self.laplacian.power_of(p, self.factor(v), self.h * self.h, self.power);
         row.into_iter().for_each(|(q, w)| entry(q, w));
     }
 
@@ -208,11 +173,6 @@ impl<const D: usize, E: Fields> TransportRows<D, E> for StabilizedRows<D, E> {
     fn report(&self) -> &Report {
         self.central.report()
     }
-}
-
-/// Whether no gamma was enough.
-fn grows(error: &Error) -> bool {
-    matches!(error.kind(), ErrorKind::Linear(LinearError::Growing { .. }))
 }
 
 /// |v|.
