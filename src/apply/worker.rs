@@ -8,6 +8,7 @@ use crate::domain::Face;
 use crate::error::{Error, ErrorKind, NeighborError, OperatorError, Result};
 use crate::neighbors::Neighbors;
 use crate::operator::{Draft, GROWTH, Method, Outputs, RowReport};
+use crate::scale::Cutoff;
 use crate::stencil::Stencil;
 
 /// Rows made side by side.
@@ -196,11 +197,16 @@ fn mend<const D: usize, M: Method<D>, P: Neighbors<D>>(
             let refusal = refusal.clone().at(p);
             Err(match lack(neighbors, &draft.stencil, &refusal) {
                 Some((found, needed)) => refusal.lacking(found, needed),
-                None if method.can_grow(&refusal) && !limited => refusal.wanting(wanted),
+                None if method.can_grow(&refusal) && !limited && admits(neighbors, wanted) => refusal.wanting(wanted),
                 None => refusal,
             })
         }
     }
+}
+
+/// Whether the domain of a provider, where it is known, admits the cutoff.
+fn admits<const D: usize>(neighbors: &impl Neighbors<D>, cutoff: f64) -> bool {
+    neighbors.domain().is_none_or(|domain| domain.admits(Cutoff(cutoff)).is_ok())
 }
 
 /// How many sources there are and how many are needed at least, where a row has too few neighbors at any cutoff.

@@ -141,6 +141,8 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     /// As [`limits`](Self::limits).
     pub fn longest_step(&mut self, u: &[S::Value]) -> Result<f64> {
         longest(|dt| {
+            // A step may come to where the source is not defined, but is not named as one that is legal there.
+            self.discrete.source_limits(self.t + dt, u)?;
             let limits = self.limits_of(self.t, dt, u)?;
             Ok(self.bound(&limits).0)
         })

@@ -284,19 +284,21 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
             // Expansion adds to the decay of what diffuses (eq. 7.11); by themselves strengths and volumes bear any.
             limits.set(Limit::Compression, Rate::default());
         }
-        if <S::Source as SceneTerm<D, S::Value>>::PRESENT {
-            let of = |t: f64| {
-                let mut limits = Limits::default();
-                let limit = self.scene.source_term().limit(&mut (), &self.held.site, t, &self.u, &mut limits);
-                limit.map(|()| limits)
-            };
-            limits = limits.larger(&of(t)?);
-            if dt > 0.0 {
-                // Where it is not finite at the end the stepper finds it so, if it comes there.
-                limits = limits.larger(&of(t + dt).unwrap_or_default());
-            }
+        limits = limits.larger(&self.source_limits(t)?);
+        if dt > 0.0 {
+            // Where it is not finite at the end the stepper finds it so, if it comes there.
+            limits = limits.larger(&self.source_limits(t + dt).unwrap_or_default());
         }
         Ok((limits, checked.map(|(report, _)| report)))
+    }
+
+    /// What the source alone bounds at time t.
+    pub(super) fn source_limits(&self, t: f64) -> Result<Limits> {
+        let mut limits = Limits::default();
+        if <S::Source as SceneTerm<D, S::Value>>::PRESENT {
+            self.scene.source_term().limit(&mut (), &self.held.site, t, &self.u, &mut limits)?;
+        }
+        Ok(limits)
     }
 
     /// The rightmost eigenvalue and the spectral radius of the diffusion rows of now.

@@ -80,26 +80,45 @@ fn decay<const D: usize, E: Fields>(
     for i in 0..E::FIELDS {
         let mut sum = 0.0;
         for j in 0..E::FIELDS {
-            let mut moved = u;
-            moved.set(j, u.get(j) + scale.get(j));
-            let slope = (source(x, t, moved).get(i) - base.get(i)) / (moved.get(j) - u.get(j));
-            if !slope.is_finite() {
+            let quotient = |scale: f64| {
+                let mut moved = u;
+                moved.set(j, u.get(j) + scale);
+                let change = source(x, t, moved).get(i) - base.get(i);
+                (change, change / (moved.get(j) - u.get(j)))
+            };
+            let root = E::EPSILON.sqrt();
+            let decay = |slope: f64| if E::FIELDS == 1 { -slope } else { slope.abs() };
+            let (change, slope) = quotient(scale.get(j));
+            let mut fastest = decay(slope);
+            // Beside a large source the change that a small field makes is rounding: its unit is taken for 1 then, too.
+            if scale.get(j) < root && change.abs() < root * base.get(i).abs() {
+                let wide = Some(decay(quotient(root).1)).filter(|wide| wide.is_finite()).unwrap_or(fastest);
+                let known = change.abs() > NOISE * E::EPSILON * base.get(i).abs();
+                fastest = if known { fastest.max(wide) } else { wide };
+            }
+            if !fastest.is_finite() {
                 return Err(SolverError::Source { field: i, t }.into());
             }
-            sum += if E::FIELDS == 1 { -slope } else { slope.abs() };
+            sum += fastest;
         }
         sums = sums.max(sum);
     }
     Ok(sums)
 }
 
+/// Roundings of S that a change must exceed to tell a slope to 1 %.
+const NOISE: f64 = 128.0;
+
 /// The changes of u that difference quotients are taken with, field by field: sqrt(eps) of the largest value, of 1 where all
-/// are zero; upwards, since sources may know no negative fields.
+/// are zero, and no less than a normal number that leaves room for the change of S; upwards, since sources may know no
+/// negative fields.
 fn difference<E: Fields>(u: &[E]) -> E {
+    let double = E::EPSILON < f64::from(f32::EPSILON);
+    let least = if double { f64::MIN_POSITIVE } else { f64::from(f32::MIN_POSITIVE) } / E::EPSILON;
     let mut scale = E::ZERO;
     for i in 0..E::FIELDS {
         let largest = u.iter().fold(0.0_f64, |most, u| most.max(u.get(i).abs()));
-        scale.set(i, E::EPSILON.sqrt() * if largest > 0.0 { largest } else { 1.0 });
+        scale.set(i, (E::EPSILON.sqrt() * if largest > 0.0 { largest } else { 1.0 }).max(least));
     }
     scale
 }

@@ -165,7 +165,7 @@ fn check<E: Fields>(offset: E, slope: f64, u: f64, found: E) -> Result<()> {
     for field in 0..E::FIELDS {
         let (offset, found) = (offset.get(field), found.get(field));
         let (expected, size) = (offset + more, offset.abs() + more.abs() + found.abs());
-        if !((found - expected).abs() <= ROUNDING * E::EPSILON * size) {
+        if !(found.is_finite() && (found - expected).abs() <= ROUNDING * E::EPSILON * size) {
             return Err(SolverError::NotAffine { u, found, expected }.into());
         }
     }

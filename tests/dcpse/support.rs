@@ -324,3 +324,16 @@ fn thousands_of_neighbors_are_no_reason_to_refuse_a_row() -> Failure {
     }
     Ok(())
 }
+
+#[test]
+fn no_cutoff_is_named_that_the_domain_does_not_admit() {
+    let torus = Domain::periodic([0.0; 2], [1.0; 2]).unwrap();
+    let pair = Particles::new(vec![[0.3, 0.4], [0.6, 0.7]]).unwrap();
+    let method = DcPse::<Laplacian<2>, 2>::new();
+    // Half of the width is the widest legal one.
+    for (cutoff, wanted) in [(0.5, None), (0.45, None), (0.4, Some(GROWTH * 0.4))] {
+        let cells = CellList::build(&pair, &torus, Cutoff(cutoff)).unwrap();
+        let error = method.assemble(&cells).unwrap_err();
+        assert_eq!(error.wanted_cutoff(), wanted, "{cutoff}: {error}");
+    }
+}

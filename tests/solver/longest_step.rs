@@ -121,3 +121,52 @@ fn longest_step_looks_no_further_than_flow_and_source_are_defined() -> Result<()
     assert!(matches!(error.kind(), ErrorKind::Solver(SolverError::Velocity { .. })), "{error}");
     Ok(())
 }
+
+#[test]
+fn longest_step_ends_where_a_source_does() -> Result<()> {
+    let ring = Particles::lattice([0.0], [1.0], [40])?;
+    let torus = Domain::periodic([0.0], [1.0])?;
+    let neighbors = Nearest::build(&ring, &torus, 6)?;
+    let sources: [fn(&[f64; 1], f64, f64) -> f64; 2] =
+        [|_, t, _| (1.0 - t).sqrt(), |_, t, u| -1e-3 * u * (1.0 - t).sqrt()];
+    for source in sources {
+        let scene = || AdvectionDiffusion::<1>::new().diffusion(1e-6, DcPse::<Laplacian<1>, 2>::new()).source(source);
+        let (mut run, mut u) = (Eulerian::new(scene(), &ring, &neighbors, Rk4::new())?, vec![1.0; 40]);
+        let dt = run.longest_step(&u)?;
+        assert!(dt > 0.5 && dt <= 1.0, "{dt}");
+        run.step(&mut u, dt)?;
+        let mut run = Lagrangian::new(scene(), &ring, &[1.0; 40], &torus, Rk4::new())?;
+        let dt = run.longest_step()?;
+        assert!(dt > 0.5 && dt <= 1.0, "{dt}");
+        run.step(dt)?;
+    }
+    Ok(())
+}
+
+/// The longest step of RK4 at a uniform field, times the rate 1 of a source.
+fn uniform<E: Fields>(u: E, source: impl Fn(E) -> E + Sync) -> Result<f64> {
+    let ring = Particles::lattice([0.0], [1.0], [8])?;
+    let neighbors = Nearest::build(&ring, &Domain::periodic([0.0], [1.0])?, 2)?;
+    let scene = AdvectionDiffusion::<1>::new().fields::<E>().source(move |_: &[f64; 1], _, u: E| source(u));
+    Eulerian::new(scene, &ring, &neighbors, Rk4::new())?.longest_step(&vec![u; 8])
+}
+
+#[test]
+fn source_bounds_a_step_however_small_the_field() -> Result<()> {
+    // The interval of RK4 on the negative axis.
+    let legal = uniform(1.0, |u: f64| -u)?;
+    assert!((legal - 2.785).abs() < 1e-3, "{legal}");
+    for power in 0..320 {
+        let u = 10.0_f64.powi(-power);
+        for found in [uniform(u, |u: f64| -u)?, uniform(u, |u: f64| 5.0 - u)?, uniform(u, |u: f64| 1e6 - u)?] {
+            assert!((found / legal - 1.0).abs() < 0.02, "1e-{power}: {found}");
+        }
+        if power < 45 {
+            let u = u as f32;
+            for found in [uniform(u, |u: f32| -u)?, uniform(u, |u: f32| 5.0 - u)?] {
+                assert!((found / legal - 1.0).abs() < 0.02, "f32, 1e-{power}: {found}");
+            }
+        }
+    }
+    Ok(())
+}

@@ -81,3 +81,12 @@ fn field_beyond_the_range_of_its_numbers_is_said_to_be() -> Result<()> {
     assert_eq!(error.particle(), Some(1), "{error}");
     Ok(())
 }
+
+#[test]
+fn source_that_is_infinite_at_the_field_found_is_refused() {
+    let sources: [fn(f64) -> f64; 3] = [|_| f64::INFINITY, |_| f64::NEG_INFINITY, |u| 1.0 + (1000.0 * u).exp()];
+    for beyond in sources {
+        let error = rod(|u| if u <= 3.0 { 1.0 } else { beyond(u) }, 10.0).unwrap_err();
+        assert!(matches!(error.kind(), ErrorKind::Solver(SolverError::NotAffine { .. })), "{error}");
+    }
+}
