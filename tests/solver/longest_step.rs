@@ -127,8 +127,8 @@ fn longest_step_ends_where_a_source_does() -> Result<()> {
     let ring = Particles::lattice([0.0], [1.0], [40])?;
     let torus = Domain::periodic([0.0], [1.0])?;
     let neighbors = Nearest::build(&ring, &torus, 6)?;
-    let sources: [fn(&[f64; 1], f64, f64) -> f64; 2] =
-        [|_, t, _| (1.0 - t).sqrt(), |_, t, u| -1e-3 * u * (1.0 - t).sqrt()];
+    type Sources = [fn(&[f64; 1], f64, f64) -> f64; 2];
+    let sources: Sources = [|_, t, _| (1.0 - t).sqrt(), |_, t, u| -1e-3 * u * (1.0 - t).sqrt()];
     for source in sources {
         let scene = || AdvectionDiffusion::<1>::new().diffusion(1e-6, DcPse::<Laplacian<1>, 2>::new()).source(source);
         let (mut run, mut u) = (Eulerian::new(scene(), &ring, &neighbors, Rk4::new())?, vec![1.0; 40]);
@@ -148,7 +148,7 @@ fn uniform<E: Fields>(u: E, source: impl Fn(E) -> E + Sync) -> Result<f64> {
     let ring = Particles::lattice([0.0], [1.0], [8])?;
     let neighbors = Nearest::build(&ring, &Domain::periodic([0.0], [1.0])?, 2)?;
     let scene = AdvectionDiffusion::<1>::new().fields::<E>().source(move |_: &[f64; 1], _, u: E| source(u));
-    Eulerian::new(scene, &ring, &neighbors, Rk4::new())?.longest_step(&vec![u; 8])
+    Eulerian::new(scene, &ring, &neighbors, Rk4::new())?.longest_step(&[u; 8])
 }
 
 #[test]
