@@ -1,12 +1,13 @@
 //! The scene by one method on one set, from t = 0 to the end.
 
 use parops::{
-    AdvectionDiffusion, Carried, CellList, DcPse, Domain, Eulerian, Lagrangian, Lambda, Laplacian, Ledger, Mesh,
-    MeshKernel, Method as Discretization, Nearest, Neighbors, Particles, Pse, Remeshing, Result, Rk4, Site, Spacing,
-    Stabilized, StepPolicy, Transport, Trigger, UpwindGradient,
+    AdvectionDiffusion, Carried, CellList, DcPse, Eulerian, Lagrangian, Lambda, Laplacian, Ledger, Mesh, MeshKernel,
+    Method as Discretization, Neighbors, Particles, Pse, Remeshing, Result, Rk4, StepPolicy, Transport, Trigger,
+    UpwindGradient,
 };
 
 use crate::exact::{DIFFUSIVITY, exact, velocity};
+use crate::scattered::{Gammas, nearest, scattered, stabilized, torus};
 
 /// A way to solve the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,8 +41,6 @@ impl Method {
 
 /// When runs end.
 pub const END: f64 = 0.5;
-/// Largest displacement of particles that stay from a lattice, in units of its spacing.
-const JITTER: f64 = 0.2;
 /// The step of a run over the longest that is legal at its start: the velocity changes.
 const SAFETY: f64 = 0.9;
 /// Steps of particles that move, in h: as many steps in proportion on every set.
@@ -74,10 +73,6 @@ pub struct Solved {
     pub viscosity: f64,
 }
 
-fn torus() -> Result<Domain<2>> {
-    Domain::periodic([0.0; 2], [1.0; 2])
-}
-
 /// The scene with n particles along an axis.
 pub fn solve(method: Method, n: usize, gammas: &Gammas) -> Result<Solved> {
     match method {
@@ -96,42 +91,10 @@ pub fn solve(method: Method, n: usize, gammas: &Gammas) -> Result<Solved> {
     }
 }
 
-fn scattered(n: usize) -> Result<Particles<2>> {
-    Particles::jittered([0.0; 2], [1.0; 2], [n; 2], JITTER, 1)
-}
-
-fn stabilized<const R: u32>(n: usize) -> Stabilized<2, R> {
-    Stabilized::new(Spacing(1.0 / n as f64))
-}
-
-fn nearest<const R: u32>(set: &Particles<2>) -> Result<Nearest<2>> {
-    Nearest::build(set, &torus()?, DcPse::<Laplacian<2>, R>::new().fewest_neighbors::<2>()?)
-}
-
 fn central<const R: u32>(method: Method, n: usize, gamma: f64) -> Result<Solved> {
     let set = scattered(n)?;
     let scheme = stabilized::<R>(n).gamma(gamma);
     fixed(method, n, &set, &nearest::<R>(&set)?, DcPse::<Laplacian<2>, R>::new(), scheme)
-}
-
-/// The gamma of the hyperviscosity that keeps DC-PSE from growing; it has no unit, and a small set tells it for all.
-pub struct Gammas {
-    second: f64,
-    fourth: f64,
-}
-
-impl Gammas {
-    pub fn find() -> Result<Self> {
-        Ok(Self { second: Self::of::<2>()?, fourth: Self::of::<4>()? })
-    }
-
-    fn of<const R: u32>() -> Result<f64> {
-        const COARSE: usize = 16;
-        let set = scattered(COARSE)?;
-        let near = nearest::<R>(&set)?;
-        let (site, flow) = (Site::new(&set, &near)?, |p: usize| velocity(&set.points()[p], 0.0));
-        Ok(stabilized::<R>(COARSE).build::<f64, _>(&site, flow, true, &near)?.gamma())
-    }
 }
 
 /// Particles that stay.

@@ -6,7 +6,7 @@ use parops::{
 };
 
 use crate::flow::{start, velocity};
-use crate::runs::torus;
+use crate::scattered::torus;
 
 /// Particles along an axis, and when the run ends.
 const N: usize = 24;

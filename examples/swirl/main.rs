@@ -25,6 +25,8 @@ mod map;
 mod options;
 mod record;
 mod runs;
+#[path = "../scattered/mod.rs"]
+mod scattered;
 #[path = "../vtk/mod.rs"]
 mod vtk;
 
@@ -35,7 +37,8 @@ use std::time::Instant;
 
 use options::Options;
 use record::{Moment, Record};
-use runs::{Gammas, Method};
+use runs::Method;
+use scattered::Gammas;
 
 fn main() -> ExitCode {
     options::run("swirl", swirl)
@@ -48,7 +51,7 @@ pub const SHOWN: usize = 64;
 fn swirl(options: &Options) -> Result<bool, Box<dyn Error>> {
     let sides: &[usize] = if options.quick { &[32, 48, SHOWN] } else { &[32, 48, SHOWN, 96, 128, 192] };
     let clock = Instant::now();
-    let gammas = Gammas::find()?;
+    let gammas = Gammas::find(flow::velocity)?;
     let [second, fourth] = [gammas.second, gammas.fourth];
     let seconds = clock.elapsed().as_secs_f64();
     println!("gamma of the hyperviscosity: {second:.2e} (r = 2), {fourth:.2e} (r = 4), found in {seconds:.1} s\n");

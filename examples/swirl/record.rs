@@ -3,7 +3,8 @@
 use parops::{CellList, Cutoff, Lambda, LedgerRow, Mesh, Particles, Result, fill_distance, least_gap};
 
 use crate::flow::{exact, start};
-use crate::runs::{Method, torus};
+use crate::runs::Method;
+use crate::scattered::torus;
 
 /// The particles and their values at a time.
 pub struct Moment {

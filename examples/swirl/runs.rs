@@ -3,13 +3,14 @@
 use std::time::Instant;
 
 use parops::{
-    AdvectionDiffusion, Carried, CellList, DcPse, Domain, Eulerian, GrowthPolicy, Lagrangian, Lambda, Laplacian,
-    LedgerRow, Mesh, MeshKernel, Nearest, Neighbors, Particles, Remeshing, Result, Rk4, Site, Spacing, Stabilized,
-    StepPolicy, Transport, Trigger, UpwindDcPse, UpwindGradient,
+    AdvectionDiffusion, Carried, CellList, Eulerian, GrowthPolicy, Lagrangian, Lambda, LedgerRow, Mesh, MeshKernel,
+    Nearest, Neighbors, Particles, Remeshing, Result, Rk4, Spacing, StepPolicy, Transport, Trigger, UpwindDcPse,
+    UpwindGradient,
 };
 
 use crate::flow::{FASTEST, PERIOD, start, velocity};
 use crate::record::{Moment, Record};
+use crate::scattered::{Gammas, nearest, scattered, stabilized, torus};
 
 /// A way to advect.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,16 +60,10 @@ impl Method {
     }
 }
 
-/// Largest displacement of particles that stay from a lattice, in units of its spacing.
-const JITTER: f64 = 0.2;
 /// Steps of particles that move, in h over the greatest speed.
 const CFL: f64 = 2.0;
 /// When overlap is lost, in h.
 const LOST: Trigger = Trigger::Overlap { hole: 1.2, gap: 0.5 };
-
-pub fn torus() -> Result<Domain<2>> {
-    Domain::periodic([0.0; 2], [1.0; 2])
-}
 
 /// One run with n particles along an axis; `watch` sees the start and every quarter.
 pub fn solve(method: Method, n: usize, gammas: &Gammas, watch: impl FnMut(Moment)) -> Result<Record> {
@@ -96,41 +91,9 @@ pub fn solve(method: Method, n: usize, gammas: &Gammas, watch: impl FnMut(Moment
     }
 }
 
-fn scattered(n: usize) -> Result<Particles<2>> {
-    Particles::jittered([0.0; 2], [1.0; 2], [n; 2], JITTER, 1)
-}
-
 fn central<const R: u32>(method: Method, n: usize, gamma: f64, watch: impl FnMut(Moment)) -> Result<Record> {
     let build = |set: &Particles<2>| Ok((nearest::<R>(set)?, stabilized::<R>(n).gamma(gamma)));
     fixed(method, n, build, watch)
-}
-
-fn stabilized<const R: u32>(n: usize) -> Stabilized<2, R> {
-    Stabilized::new(Spacing(1.0 / n as f64))
-}
-
-fn nearest<const R: u32>(set: &Particles<2>) -> Result<Nearest<2>> {
-    Nearest::build(set, &torus()?, DcPse::<Laplacian<2>, R>::new().fewest_neighbors::<2>()?)
-}
-
-/// The gamma of the hyperviscosity that keeps DC-PSE from growing; it has no unit, and a small set tells it for all.
-pub struct Gammas {
-    pub second: f64,
-    pub fourth: f64,
-}
-
-impl Gammas {
-    pub fn find() -> Result<Self> {
-        Ok(Self { second: Self::of::<2>()?, fourth: Self::of::<4>()? })
-    }
-
-    fn of<const R: u32>() -> Result<f64> {
-        const COARSE: usize = 16;
-        let set = scattered(COARSE)?;
-        let near = nearest::<R>(&set)?;
-        let (site, flow) = (Site::new(&set, &near)?, |p: usize| velocity(&set.points()[p], 0.0));
-        Ok(stabilized::<R>(COARSE).build::<f64, _>(&site, flow, true, &near)?.gamma())
-    }
 }
 
 /// Particles that stay.
