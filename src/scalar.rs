@@ -31,6 +31,29 @@ pub(crate) fn square<T: Scalar, const D: usize>(z: &[T; D]) -> T {
     s
 }
 
+/// The length |z|, of vectors of any scale.
+#[inline(always)]
+pub(crate) fn length<T: Scalar, const D: usize>(z: &[T; D]) -> T {
+    let s = square(z);
+    // Squares below the first are short of digits.
+    let sound = s > T::lift(LEAST_SQUARE) && s.is_finite();
+    if sound { s.sqrt() } else { scaled_length(z) }
+}
+
+/// Above the least normal number over epsilon, of `f32` too.
+const LEAST_SQUARE: f64 = 1e-30;
+
+/// The same by the largest component.
+#[cold]
+fn scaled_length<T: Scalar, const D: usize>(z: &[T; D]) -> T {
+    let largest = z.iter().fold(T::zero(), |largest, x| largest.max(x.abs()));
+    if largest == T::zero() || !largest.is_finite() {
+        square(z)
+    } else {
+        largest * square(&z.map(|x| x / largest)).sqrt()
+    }
+}
+
 /// Figures of a report in files: a number where it is finite, a word where it is not, for formats such as JSON that have
 /// no other way to say so.
 #[cfg(feature = "serde")]

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use super::{Apply, Field, Rows, check, scalars};
 use crate::error::{Error, LinearError, OperatorError, ParticleError, Result};
 use crate::particles::reserved;
+use crate::scalar::length;
 use crate::scale::Spacing;
 
 /// The term (-1)^(k+1) gamma |v| h^(2k-1) Lap^k u for advection of order r: k is the least with 2k - 1 >= r, so 2, 3, 4
@@ -135,12 +136,12 @@ impl<L: Borrow<Rows<[f64; 1], T>>, T: Field> Hyperviscosity<L, T> {
             std::mem::swap(power_of_u, next);
         }
         let factor = T::lift(sign(*power) * *gamma / *h);
-        let sums = du.iter().zip(power_of_u.iter()).zip(velocities).map(|((du, x), v)| *du + factor * speed(v) * *x);
+        let sums = du.iter().zip(power_of_u.iter()).zip(velocities).map(|((du, x), v)| *du + factor * length(v) * *x);
         if let Some((p, value)) = sums.enumerate().find(|(_, sum)| !sum.is_finite()) {
             return Err(Error::from(crate::error::ApplyError::Overflow { value: value.as_() }).at(p));
         }
         for ((du, x), v) in du.iter_mut().zip(power_of_u.iter()).zip(velocities) {
-            *du += factor * speed(v) * *x;
+            *du += factor * length(v) * *x;
         }
         Ok(())
     }
@@ -155,10 +156,4 @@ impl<L: Borrow<Rows<[f64; 1], T>>, T: Field> Hyperviscosity<L, T> {
 /// (-1)^(k+1).
 fn sign(power: u32) -> f64 {
     if power.is_multiple_of(2) { -1.0 } else { 1.0 }
-}
-
-/// |v|.
-#[inline(always)]
-fn speed<T: Field, const D: usize>(v: &[T; D]) -> T {
-    v.iter().fold(T::zero(), |sum, &v| sum + v * v).sqrt()
 }

@@ -3,6 +3,7 @@
 use nalgebra::{Complex, DMatrix, DVector, Schur, SymmetricEigen};
 
 use super::norm::norm;
+use super::pseudospectrum::reach;
 use crate::particles::Random;
 
 type C = Complex<f64>;
@@ -15,6 +16,8 @@ pub(super) struct Ordered {
     vectors: DMatrix<C>,
     /// T, upper triangular with the eigenvalues on its diagonal, in units of `scale`.
     triangle: DMatrix<C>,
+    /// The norm of H.
+    scale: f64,
 }
 
 impl Ordered {
@@ -26,22 +29,13 @@ impl Ordered {
         if !(scale > 0.0 && scale.is_finite()) {
             let values = vec![C::new(0.0, 0.0); size];
             let (vectors, triangle) = (DMatrix::identity(size, size), DMatrix::zeros(size, size));
-            return (scale == 0.0).then_some(Self { values, vectors, triangle });
+            return (scale == 0.0).then_some(Self { values, vectors, triangle, scale });
         }
         let (u, t) = form(h, scale)?;
         let (mut u, mut t) = (u.map(|x| C::new(x, 0.0)), t.map(|x| C::new(x, 0.0)));
         // How many eigenvalues belong together at each place: 1, or 2 for conjugates.
-        let mut units = Vec::new();
-        let mut i = 0;
-        while i < size {
-            let pair = i + 1 < size && t[(i + 1, i)].re != 0.0;
-            if pair {
-                split(&mut t, &mut u, i);
-            }
-            let length = 1 + usize::from(pair);
-            units.push((key(t[(i, i)] * scale), length));
-            i += length;
-        }
+        let blocks = triangulate(&mut t, &mut u);
+        let mut units: Vec<_> = blocks.into_iter().map(|(i, length)| (key(t[(i, i)] * scale), length)).collect();
         // Insertion, since only neighbors can be exchanged.
         for at in 1..units.len() {
             let mut unit = at;
@@ -55,12 +49,16 @@ impl Ordered {
                 unit -= 1;
             }
         }
-        Some(Self { values: (0..size).map(|i| t[(i, i)] * scale).collect(), vectors: u, triangle: t })
+        Some(Self { values: (0..size).map(|i| t[(i, i)] * scale).collect(), vectors: u, triangle: t, scale })
     }
 
-    /// The condition of the foremost eigenvalue.
-    pub(super) fn condition_of_first(&self) -> f64 {
-        in_triangle(&self.triangle, 0)
+    /// How far left a change of H that large may move the foremost eigenvalue, where `beta` is what follows the last vector.
+    pub(super) fn reach_of_first(&self, beta: f64, change: f64) -> f64 {
+        if self.scale == 0.0 {
+            return change;
+        }
+        let below: Vec<C> = self.vectors.row(self.values.len() - 1).iter().map(|z| z * (beta / self.scale)).collect();
+        self.scale * reach(&self.triangle, &below, 0, change / self.scale)
     }
 
     /// The last entry of the eigenvector of the foremost eigenvalue: by how much it fails to be one of the whole.
@@ -88,60 +86,16 @@ impl Ordered {
     }
 }
 
-/// All eigenvalues of a real matrix, and its Schur form in units of its norm. `None` where they are not found.
-pub(super) fn eigenvalues(a: &DMatrix<f64>) -> Option<(Vec<C>, DMatrix<f64>)> {
+/// All eigenvalues of a real matrix in units of its norm, on the diagonal of the triangle of its Schur form. `None` where they
+/// are not found.
+pub(super) fn eigenvalues(a: &DMatrix<f64>) -> Option<DMatrix<C>> {
     let (size, scale) = (a.nrows(), norm(a.as_slice()));
     if !(scale > 0.0 && scale.is_finite()) {
-        return (scale == 0.0).then(|| (vec![C::new(0.0, 0.0); size], DMatrix::zeros(size, size)));
+        return (scale == 0.0).then(|| DMatrix::zeros(size, size));
     }
-    let t = form(a, scale)?.1;
-    let mut values = Vec::with_capacity(size);
-    while values.len() < size {
-        let i = values.len();
-        if i + 1 < size && t[(i + 1, i)] != 0.0 {
-            let half = (t[(i, i)] - t[(i + 1, i + 1)]) / 2.0;
-            let root = C::new(half * half + t[(i, i + 1)] * t[(i + 1, i)], 0.0).sqrt();
-            let middle = t[(i + 1, i + 1)] + half;
-            values.extend([(root + middle) * scale, (-root + middle) * scale]);
-        } else {
-            values.push(C::new(t[(i, i)] * scale, 0.0));
-        }
-    }
-    Some((values, t))
-}
-
-/// The condition |x| |y| / |y* x| of eigenvalue number i of [`eigenvalues`], x and y its right and left eigenvectors: by how
-/// much more than the matrix it may change.
-pub(super) fn condition(t: &DMatrix<f64>, i: usize) -> f64 {
-    let size = t.nrows();
-    let (mut t, mut none) = (t.map(|x| C::new(x, 0.0)), DMatrix::zeros(0, size));
-    (1..size).for_each(|i| {
-        if t[(i, i - 1)].re != 0.0 {
-            split(&mut t, &mut none, i - 1)
-        }
-    });
-    in_triangle(&t, i)
-}
-
-/// The condition of entry i of the diagonal of a triangle.
-fn in_triangle(t: &DMatrix<C>, i: usize) -> f64 {
-    let (one, zero) = (C::new(1.0, 0.0), C::new(0.0, 0.0));
-    let entry = |sum: C, j: usize| {
-        let apart = t[(i, i)] - t[(j, j)];
-        if sum == zero { zero } else { sum * apart.conj() / apart.norm_sqr() }
-    };
-    // T x = lambda x ends at i, y* T = lambda y* begins there; both are 1 there, and their product is.
-    let (mut x, mut y) = (vec![zero; i + 1], vec![one; t.ncols() - i]);
-    x[i] = one;
-    for j in (0..i).rev() {
-        x[j] = entry((j + 1..=i).fold(zero, |sum, k| sum + t[(j, k)] * x[k]), j);
-    }
-    for j in i + 1..t.ncols() {
-        y[j - i] = entry((i..j).fold(zero, |sum, k| sum + y[k - i] * t[(k, j)]), j);
-    }
-    let size = |z: &[C]| z.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt();
-    let condition = size(&x) * size(&y);
-    if condition.is_finite() { condition } else { f64::INFINITY }
+    let mut t = form(a, scale)?.1.map(|x| C::new(x, 0.0));
+    triangulate(&mut t, &mut DMatrix::zeros(0, size));
+    Some(t)
 }
 
 /// U and T with A U = scale U T.
@@ -190,6 +144,21 @@ fn rotate(t: &mut DMatrix<C>, u: &mut DMatrix<C>, i: usize, a: C, b: C) {
             matrix[(row, i + 1)] = a * y - b * x;
         }
     }
+}
+
+/// Turns the blocks of conjugates of a real Schur form into triangles; where blocks begin, and how long they are.
+fn triangulate(t: &mut DMatrix<C>, u: &mut DMatrix<C>) -> Vec<(usize, usize)> {
+    let (mut blocks, mut i) = (Vec::new(), 0);
+    while i < t.nrows() {
+        let pair = i + 1 < t.nrows() && t[(i + 1, i)].re != 0.0;
+        if pair {
+            split(t, u, i);
+        }
+        let length = 1 + usize::from(pair);
+        blocks.push((i, length));
+        i += length;
+    }
+    blocks
 }
 
 /// Turns the block of two conjugates at i into a triangle.

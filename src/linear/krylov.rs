@@ -13,9 +13,6 @@ const STEADY: usize = 4;
 /// Times what the condition of an eigenvalue says of its error: of a pair that is one eigenvalue torn apart it says half.
 const MARGIN: f64 = 8.0;
 
-/// Rounding of products with rows whose weights are rounded themselves, in units of the radius.
-const ROUNDED: f64 = 128.0 * f64::EPSILON;
-
 /// What a search found.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Foremost {
@@ -33,6 +30,8 @@ pub(super) struct Foremost {
 pub(super) struct Search {
     pub(super) subspace: usize,
     pub(super) tolerance: f64,
+    /// What entries of the map are rounded by, in units of the radius.
+    pub(super) rounding: f64,
     pub(super) most: usize,
 }
 
@@ -87,7 +86,7 @@ impl Search {
             let converged = beta == 0.0 || (residual <= unit && steady >= STEADY);
             let found = || {
                 // Products round, too.
-                let error = MARGIN * residual.max(ROUNDED * radius) * ordered.condition_of_first();
+                let error = ordered.reach_of_first(beta, MARGIN * residual.max(self.rounding * radius));
                 Ok(Foremost { value, residual, error, applies, converged })
             };
             if converged || applies >= self.most || full < size || size < 4 {

@@ -14,6 +14,7 @@ mod krylov;
 mod lu;
 mod matrix_market;
 mod norm;
+mod pseudospectrum;
 mod replace;
 mod shifted;
 mod solver;

@@ -1,13 +1,14 @@
 //! Where the eigenvalues of an operator lie: the rightmost and the largest, estimated from products.
 
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
 
-use super::invariant::{condition, eigenvalues};
+use super::invariant::eigenvalues;
 use super::krylov::Search;
 use super::norm::norm;
+use super::pseudospectrum::reach;
 use crate::apply::Apply;
 use crate::error::{Error, LinearError, Result};
-use crate::particles::reserved;
+use crate::particles::{Random, reserved};
 
 /// Estimates the rightmost eigenvalue max Re(lambda) and the spectral radius max |lambda| of a linear map u -> A u, from
 /// products with A alone: stored rows, an operator without weights, a sum of both, or what boundary conditions leave of
@@ -26,7 +27,7 @@ use crate::particles::reserved;
 /// rightmost eigenvalue stands apart. Amid a spectrum along the imaginary axis (advection with '+', or stabilized) growth
 /// below about 0.01 is missed with m = 32, also by runs that converged, to an eigenvalue further left; with m = 128 the
 /// estimate was within 4e-4 after 3000 products. Among eigenvalues crowded at zero growth below about (10/products)^2 is
-/// missed: a large abscissa with a small residual proves growth, a small one proves stability only where
+/// missed: an abscissa above its [`error`](Spectrum::error) proves growth, one below proves stability only where
 /// [`exact`](Spectrum::exact).
 ///
 /// Defaults: m = 32, tolerance 1e-9, at most 3000 products a run.
@@ -48,13 +49,18 @@ pub struct SpectrumEstimator {
     tolerance: f64,
     most: usize,
     dense: usize,
+    rounding: f64,
 }
 
 /// An abscissa below this, over the radius, is rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// One below this may be what rounding tears two or three equal eigenvalues apart by.
-const TORN: f64 = 1e-4;
+/// One below this may be what rounding tears equal eigenvalues apart by: 0.003 where five have one eigenvector, as 0 has
+/// where rows of order 8 take x^8 to x^6 and so on, and 0.06 in `f32`.
+const TORN: f64 = 0.1;
+
+/// Times what another rounding moves an eigenvalue by.
+const MARGIN: f64 = 8.0;
 
 /// Roundings of a matrix and of its eigenvalues, in eps of its norm.
 const ROUNDED: f64 = 64.0;
@@ -72,8 +78,9 @@ pub struct Spectrum {
     pub frequency: f64,
     /// |A x - lambda x| of its unit vector x; the rounding of the matrix where all eigenvalues were found.
     pub residual: f64,
-    /// How far residual and rounding let that eigenvalue be off: far more where another one has nearly the same eigenvector.
-    /// Where all eigenvalues were found it is 0 but for abscissas up to 1e-4 of the radius, which rounding may make of 0.
+    /// How far left of it residual and rounding let that eigenvalue be, to a factor of some 2: far more where another one has
+    /// nearly the same eigenvector. From below where not [`exact`](Self::exact); 0 where exact and the abscissa is not
+    /// positive.
     pub error: f64,
     /// max |lambda|, from below unless exact.
     pub radius: f64,
@@ -112,7 +119,7 @@ impl SpectrumEstimator {
     /// The estimator at its defaults.
     #[inline]
     pub fn new() -> Self {
-        Self { subspace: 32, tolerance: 1e-9, most: 3000, dense: 640 }
+        Self { subspace: 32, tolerance: 1e-9, most: 3000, dense: 640, rounding: ROUNDED * f64::EPSILON }
     }
 
     /// Sets the number m of vectors, at least 8.
@@ -133,6 +140,12 @@ impl SpectrumEstimator {
     #[must_use]
     pub fn dense(self, entries: usize) -> Self {
         Self { dense: entries, ..self }
+    }
+
+    /// Sets what the entries of the map were rounded to, `f64::EPSILON` but for rows in `f32`.
+    #[must_use]
+    pub(crate) fn rounded(self, epsilon: f64) -> Self {
+        Self { rounding: ROUNDED * epsilon, ..self }
     }
 
     /// Sets the residual in units of the radius.
@@ -180,7 +193,7 @@ impl SpectrumEstimator {
             return Ok(Spectrum::default());
         }
         if self.is_exact(n)
-            && let Some(spectrum) = all(n, &mut apply)?
+            && let Some(spectrum) = all(n, &mut apply, self.rounding)?
         {
             return Ok(spectrum);
         }
@@ -193,7 +206,9 @@ impl SpectrumEstimator {
     pub(crate) fn settle(&self, n: usize, mut apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<Spectrum> {
         if n > 0 && self.is_exact(n) {
             let found = self.runs(n, &mut apply);
-            let settled = |found: &Spectrum| !(ROUNDING * found.radius..=found.error).contains(&found.abscissa);
+            let settled = |found: &Spectrum| {
+                !(ROUNDING * found.radius..=found.error.max(TORN * found.radius)).contains(&found.abscissa)
+            };
             if found.as_ref().is_ok_and(|found| found.converged && settled(found)) {
                 return found;
             }
@@ -202,17 +217,37 @@ impl SpectrumEstimator {
     }
 
     fn runs(&self, n: usize, mut apply: &mut Product<'_>) -> Result<Spectrum> {
-        let outer = Search { subspace: self.subspace, tolerance: self.tolerance.max(1e-3), most: self.most };
+        let tolerance = self.tolerance.max(1e-3);
+        let outer = Search { subspace: self.subspace, tolerance, rounding: self.rounding, most: self.most };
         let largest = outer.run(n, &mut apply, |value| value.norm(), 0.0)?;
         let right = Search { tolerance: self.tolerance, ..outer };
-        let rightmost = right.run(n, &mut apply, |value| value.re, largest.value.norm())?;
+        // One type each for the map and for what is foremost: a program holds the search for it once.
+        let key = |value: Complex<f64>| value.re;
+        let rightmost = right.run(n, &mut apply, key, largest.value.norm())?;
+        let radius = largest.value.norm().max(rightmost.value.norm());
+        let abscissa = rightmost.value.re;
+        let (mut error, mut applies) = (rightmost.error, largest.applies + rightmost.applies);
+        if abscissa > ROUNDING * radius + error && abscissa <= TORN * radius {
+            // What rounding, or what the run leaves, has torn from its like is elsewhere after another rounding.
+            let (size, mut random) = (rightmost.residual.max(self.rounding * radius), Random::new(0x7042));
+            let change: Vec<f64> = (0..n).map(|_| size * random.uniform().mul_add(2.0, -1.0)).collect();
+            let mut rounded: &mut Product<'_> = &mut |u, du| {
+                apply(u, du)?;
+                du.iter_mut().zip(u).zip(&change).for_each(|((du, u), change)| *du += change * u);
+                Ok(())
+            };
+            // Where that finds no eigenvalues all is open.
+            let other = right.run(n, &mut rounded, key, radius).ok();
+            error = error.max(other.map_or(abscissa, |other| MARGIN * (other.value.re - abscissa).abs()));
+            applies += other.map_or(0, |other| other.applies);
+        }
         Ok(Spectrum {
-            abscissa: rightmost.value.re,
+            abscissa,
             frequency: rightmost.value.im.abs(),
             residual: rightmost.residual,
-            error: rightmost.error,
-            radius: largest.value.norm().max(rightmost.value.norm()),
-            applies: largest.applies + rightmost.applies,
+            error,
+            radius,
+            applies,
             converged: rightmost.converged,
             exact: false,
         })
@@ -221,7 +256,7 @@ impl SpectrumEstimator {
 
 /// The spectrum from all eigenvalues of the matrix, whose columns are the products with unit vectors; `None` where they are
 /// not found.
-fn all(n: usize, apply: &mut impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<Option<Spectrum>> {
+fn all(n: usize, apply: &mut impl FnMut(&[f64], &mut [f64]) -> Result<()>, rounding: f64) -> Result<Option<Spectrum>> {
     // Room for the matrix, and for what the search for its eigenvalues takes beside it.
     let _: Vec<f64> = reserved(n.saturating_mul(n).saturating_mul(8))?;
     let (mut matrix, mut unit) = (DMatrix::zeros(n, n), vec![0.0; n]);
@@ -233,14 +268,14 @@ fn all(n: usize, apply: &mut impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Re
             return Err(Error::from(LinearError::Value { value }).at(p));
         }
     }
-    let residual = f64::EPSILON * norm(matrix.as_slice());
-    let Some((values, form)) = eigenvalues(&matrix) else { return Ok(None) };
-    let first = (0..n).fold(0, |first, i| if values[i].re > values[first].re { i } else { first });
-    let rightmost = values[first];
-    let radius = values.iter().fold(0.0, |radius: f64, value| radius.max(value.norm()));
-    let (abscissa, frequency) = (rightmost.re, rightmost.im.abs());
-    let doubtful = abscissa > ROUNDING * radius && abscissa <= TORN * radius;
-    let error = if doubtful { ROUNDED * residual * condition(&form, first) } else { 0.0 };
-    let (applies, converged, exact) = (n, true, true);
+    let scale = norm(matrix.as_slice());
+    let Some(triangle) = eigenvalues(&matrix) else { return Ok(None) };
+    let value = |i: usize| triangle[(i, i)];
+    let first = (0..n).fold(0, |first, i| if value(i).re > value(first).re { i } else { first });
+    let radius = scale * (0..n).fold(0.0, |radius: f64, i| radius.max(value(i).norm()));
+    let (abscissa, frequency) = (scale * value(first).re, scale * value(first).im.abs());
+    let doubtful = abscissa > ROUNDING * radius;
+    let error = if doubtful { scale * reach(&triangle, &[], first, rounding) } else { 0.0 };
+    let (residual, applies, converged, exact) = (f64::EPSILON * scale, n, true, true);
     Ok(Some(Spectrum { abscissa, frequency, residual, error, radius, applies, converged, exact }))
 }

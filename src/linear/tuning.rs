@@ -5,6 +5,7 @@ use std::borrow::Borrow;
 use super::spectrum::{Spectrum, SpectrumEstimator};
 use crate::apply::{Hyperviscosity, Rows};
 use crate::error::{LinearError, Result};
+use crate::scalar::length;
 
 /// The weakest hyperviscosity tried, but for halvings.
 const WEAKEST: f64 = 1.0 / 4096.0;
@@ -111,8 +112,7 @@ impl<L: Borrow<Rows>> Hyperviscosity<L> {
 
     /// |v|_max / h.
     fn fastest<const D: usize>(&self, velocities: &[[f64; D]]) -> f64 {
-        let squared = |v: &[f64; D]| v.iter().map(|v| v * v).sum::<f64>();
-        velocities.iter().map(squared).fold(0.0, f64::max).sqrt() / self.spacing().0
+        velocities.iter().map(length).fold(0.0, f64::max) / self.spacing().0
     }
 }
 

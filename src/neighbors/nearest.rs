@@ -4,7 +4,7 @@ use super::placed::distance_squared;
 use super::{CellList, Neighbors};
 use crate::domain::{Domain, LENGTH_HIGH, LENGTH_LOW};
 use crate::error::{DomainError, ErrorKind, NeighborError, Result};
-use crate::particles::{Particles, reserved};
+use crate::particles::{Particles, Random, reserved};
 use crate::scale::Cutoff;
 use crate::stencil::{Neighbor, Stencil};
 
@@ -97,13 +97,13 @@ impl<const D: usize> Nearest<D> {
         cutoffs.resize(targets.len(), 0.0);
         let mut open: Vec<usize> = reserved(targets.len())?;
         open.extend(0..targets.len());
-        let (mut growth, mut guessed) = (GROWTH, true);
+        let (mut growth, mut guessed, mut random) = (GROWTH, true, Random::new(0x5eed));
         while !open.is_empty() || levels.is_empty() {
             let mut level = cells(reach)?;
             if guessed {
                 // All that is open, searched in cells far too large, would be pairs of everybody.
-                let sample = (0..open.len().min(SAMPLE)).map(|i| &open[spread(i, open.len())]);
-                let nearest = sample.filter_map(|&p| search.distance(&level, p)).filter(|&d| d > 0.0);
+                let sample = (0..open.len().min(SAMPLE)).map(|i| spread(&mut random, i, &open));
+                let nearest = sample.filter_map(|p| search.distance(&level, p)).filter(|&d| d > 0.0);
                 let least = (nearest.fold(level.reach(), f64::min) * SHELL).max(LENGTH_LOW);
                 // Served is at least the one that is so near.
                 if 2.0 * least <= level.reach() {
@@ -166,12 +166,11 @@ impl<const D: usize> Search<D> {
     }
 }
 
-/// Entry number i of a sample from `count`: multiples of the golden ratio, since a stride may be in step with how the targets
-/// are ordered.
-fn spread(i: usize, count: usize) -> usize {
-    const RATIO: u64 = 0x9e37_79b9_7f4a_7c15;
-    let turn = (i as u64).wrapping_mul(RATIO);
-    ((u128::from(turn) * count as u128) >> 64) as usize
+/// Number i of a sample of the targets that are open, all where they are no more: at random, since any stride may be in step
+/// with how they are ordered.
+fn spread(random: &mut Random, i: usize, open: &[usize]) -> usize {
+    let many = open.len() > SAMPLE;
+    open[if many { ((u128::from(random.bits()) * open.len() as u128) >> 64) as usize } else { i }]
 }
 
 /// The widest legal cutoff that can still find a neighbor.

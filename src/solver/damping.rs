@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVectorView, DVectorViewMut};
 use crate::apply::{Hyperviscosity, Rows};
 use crate::error::{Error, ErrorKind, LinearError, Result};
 use crate::linear::{OPEN, SpectrumEstimator, least};
+use crate::scalar::length;
 use crate::scale::Spacing;
 
 /// The growth that is left, in |v|_max / h, where eigenvalues are exact: above their rounding, below what runs refuse.
@@ -59,7 +60,7 @@ impl<const D: usize> Damping<D> {
     /// The gamma that the particles around the fastest one need, with the same margin as an estimate of all.
     fn part(&self, flow: &[[f64; D]]) -> Result<f64> {
         let Self { rows, term } = self;
-        let speed = |p: usize| flow[p].iter().fold(0.0, |sum, v| sum + v * v).sqrt();
+        let speed = |p: usize| length(&flow[p]);
         // Far from the rim where all are as fast.
         let middle = flow.len() / 2;
         let fastest = (0..flow.len()).fold(middle, |most, p| if speed(p) > speed(most) { p } else { most });

@@ -21,7 +21,8 @@ use crate::time::Plan;
 ///
 /// Before each step the limits of the moment are computed from the actual rows; a step above them is refused unless
 /// [`step_policy`](Self::step_policy) says otherwise. After an error, and after a panic in a function of the scene, field
-/// and run are what they were before the step. A scene without a boundary allocates nothing after the first step.
+/// and run are what they were before the step, but that a stepper that remembers earlier steps starts anew where it was amid
+/// substeps. A scene without a boundary allocates nothing after the first step.
 ///
 /// ```
 /// use parops::{AdvectionDiffusion, CellList, DcPse, Domain, Eulerian, Laplacian, Particles, Rk4};

@@ -12,8 +12,8 @@ use crate::linear::{Spectrum, SpectrumEstimator};
 /// by, if that is more.
 const LIMIT: f64 = 1e-8;
 
-/// How far right of the spectrum estimates amid the imaginary axis end that are not exact, over the radius; their error
-/// where that is less.
+/// How far right of the spectrum estimates end that did not converge, as amid the imaginary axis, over the radius; their
+/// error where that is less.
 const RESOLUTION: f64 = 0.002;
 
 /// Vectors of the search where a term oscillates: amid the imaginary axis fewer miss growth.
@@ -55,7 +55,8 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
             free.iter().zip(du).for_each(|(&p, du)| *du = rate[p].get(0));
             Ok(())
         };
-        let estimator = SpectrumEstimator::new().subspace(if oscillates { VECTORS } else { 32 }).most(MOST);
+        let vectors = if oscillates { VECTORS } else { 32 };
+        let estimator = SpectrumEstimator::new().subspace(vectors).most(MOST).rounded(S::Value::EPSILON);
         if oscillates { estimator.estimate(free.len(), apply) } else { estimator.settle(free.len(), apply) }
     }
 
@@ -87,8 +88,10 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
 /// [`SolverError::Growing`] where it is refused.
 fn recorded<E: Fields>(spectrum: &Spectrum, settled: bool, policy: GrowthPolicy) -> Result<f64> {
     let (rate, radius, limit) = (spectrum.abscissa, spectrum.radius, legal::<E>());
-    // What the residual leaves open is no proof of growth, but estimates that did not converge are good to this too.
-    let open = spectrum.error.min(RESOLUTION * radius);
+    // What rounding and residual leave open is no proof of growth. `f32` tears a chain of four apart by more than estimates
+    // amid the axis end.
+    let resolution = RESOLUTION.max(E::EPSILON.powf(0.25));
+    let open = if spectrum.converged { spectrum.error } else { spectrum.error.min(resolution * radius) };
     match (rate - open > limit * radius, policy) {
         (true, GrowthPolicy::Refuse) => Err(SolverError::Growing { rate, radius, limit }.into()),
         (true, _) => Ok(rate),
@@ -115,7 +118,7 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         if policy == GrowthPolicy::Unknown {
             return Ok(f64::NAN);
         }
-        let spectrum = self.spectrum(estimator)?;
+        let spectrum = self.spectrum(estimator.rounded(S::Value::EPSILON))?;
         recorded::<S::Value>(&spectrum, spectrum.converged, policy)
     }
 }

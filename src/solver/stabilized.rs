@@ -10,7 +10,7 @@ use crate::apply::{Hyperviscosity, Report, Rows};
 use crate::error::{Error, LinearError, ParticleError, Result};
 use crate::neighbors::Neighbors;
 use crate::operator::{DcPse, Gradient, Laplacian};
-use crate::scalar::Scalar;
+use crate::scalar::{Scalar, length};
 use crate::scale::Spacing;
 
 /// DC-PSE advection of order R with hyperviscosity,
@@ -71,7 +71,7 @@ impl<const D: usize, E: Fields> StabilizedRows<D, E> {
     /// (-1)^k gamma |v| / h, what (h^2 Lap)^k u adds to v . grad u by.
     fn factor(&self, v: &[f64; D]) -> f64 {
         let sign = if self.power.is_multiple_of(2) { 1.0 } else { -1.0 };
-        sign * self.gamma * speed(v) / self.h
+        sign * self.gamma * length(v) / self.h
     }
 }
 
@@ -163,7 +163,7 @@ impl<const D: usize, E: Fields> TransportRows<D, E> for StabilizedRows<D, E> {
 
     fn hyperviscosity(&self, _: usize, v: &[f64; D]) -> Rate {
         let radius = self.h * self.h * self.laplacian.report().spectral_bound;
-        Rate::decay(self.gamma * speed(v) / self.h * radius.powi(self.power as i32))
+        Rate::decay(self.gamma * length(v) / self.h * radius.powi(self.power as i32))
     }
 
     fn divergence(&self, p: usize, v: &[[f64; D]]) -> Option<f64> {
@@ -173,10 +173,4 @@ impl<const D: usize, E: Fields> TransportRows<D, E> for StabilizedRows<D, E> {
     fn report(&self) -> &Report {
         self.central.report()
     }
-}
-
-/// |v|.
-#[inline(always)]
-fn speed<const D: usize>(v: &[f64; D]) -> f64 {
-    v.iter().fold(0.0, |sum, v| sum + v * v).sqrt()
 }

@@ -13,7 +13,7 @@ pub(super) fn longest(mut limit: impl FnMut(f64) -> Result<f64>) -> Result<f64> 
         }
         let found = match limit(dt) {
             // Flow or coefficients may not be defined so far ahead.
-            Err(_) if turn < FARTHEST => 0.5 * dt,
+            Err(_) if 0.5 * dt > 0.0 => 0.5 * dt,
             found => found?,
         };
         if !(found < dt) {
@@ -27,8 +27,6 @@ pub(super) fn longest(mut limit: impl FnMut(f64) -> Result<f64>) -> Result<f64> 
 
 /// Steps that are tried before they are halved.
 const TURNS: usize = 8;
-/// Steps after which what cannot be evaluated is no matter of how far ahead.
-const FARTHEST: usize = 64;
 
 /// What is left of a step.
 pub(super) struct Substeps {

@@ -10,7 +10,7 @@ use crate::apply::{Report, Rows};
 use crate::error::{Error, Result, SolverError};
 use crate::neighbors::Neighbors;
 use crate::operator::UpwindGradient;
-use crate::scalar::Scalar;
+use crate::scalar::{Scalar, length};
 
 /// The rows of the upwind scheme of order 1, for any velocity.
 ///
@@ -76,8 +76,7 @@ impl<const D: usize> Transport<D> for UpwindGradient<D> {
     }
 
     fn viscosity(&self, p: usize, v: &[f64; D]) -> f64 {
-        let speed = v.iter().fold(0.0, |sum, v| sum + v * v).sqrt();
-        self.epsilon().get(p).unwrap_or(f64::NAN) * speed / std::f64::consts::PI.sqrt()
+        self.epsilon().get(p).unwrap_or(f64::NAN) * length(v) / std::f64::consts::PI.sqrt()
     }
 }
 

@@ -189,6 +189,57 @@ fn error_of_an_eigenvalue_is_that_of_its_eigenvector_too() -> Result<()> {
 }
 
 #[test]
+fn chain_torn_by_rounding_is_within_its_error() -> Result<()> {
+    // A chain of 0 of length k, seen through a reflection that rounds it, beside eigenvalues from -1 on.
+    let n = 120;
+    let v: Vec<f64> = (0..n).map(|i| ((i * i) as f64).sin()).collect();
+    let square: f64 = v.iter().map(|v| v * v).sum();
+    let reflect = |u: &mut [f64]| {
+        let along: f64 = 2.0 * v.iter().zip(u.iter()).map(|(v, u)| v * u).sum::<f64>() / square;
+        u.iter_mut().zip(&v).for_each(|(u, v)| *u -= along * v);
+    };
+    for chain in 2..=6 {
+        let map = |u: &[f64], du: &mut [f64]| {
+            let mut w = u.to_vec();
+            reflect(&mut w);
+            (0..n).for_each(|i| {
+                du[i] = match i {
+                    _ if i + 1 < chain => w[i + 1],
+                    _ if i < chain => 0.0,
+                    _ => w[i] * (-1.0 - (i - chain) as f64 / n as f64),
+                }
+            });
+            reflect(du);
+            Ok(())
+        };
+        for (estimator, change) in [(SpectrumEstimator::new(), f64::EPSILON), (SpectrumEstimator::new().dense(0), 1e-9)]
+        {
+            let found = estimator.estimate(n, map)?;
+            let torn = change.powf(1.0 / chain as f64);
+            assert!(
+                found.abscissa <= found.error.max(1e-12) && found.abscissa <= torn && found.error <= 100.0 * torn,
+                "{chain}: {found:?}"
+            );
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn slow_growth_that_stands_apart_is_no_rounding() -> Result<()> {
+    for (n, growth) in [(120, 1e-3), (120, 0.05), (700, 1e-3), (700, 1e-6)] {
+        let lambda = |i: usize| if i == 0 { growth } else { -(i as f64) / n as f64 };
+        // Below the diagonal as much as on it: eigenvectors are not orthogonal.
+        let below = (1..n).map(|i| (i, i - 1, 0.3 / n as f64));
+        let matrix = CsrMatrix::from_triplets(n, n, (0..n).map(|i| (i, i, lambda(i))).chain(below))?;
+        let found = SpectrumEstimator::new().of(&matrix)?;
+        assert!((found.abscissa - growth).abs() <= found.error.max(1e-12), "{n}: {found:?}");
+        assert!(found.converged && found.error <= 0.1 * growth, "{n}: {found:?}");
+    }
+    Ok(())
+}
+
+#[test]
 fn estimates_are_repeated_bit_for_bit_and_scale_with_the_operator() {
     let set = Particles::jittered([0.0; 2], [1.0; 2], [SIDE; 2], 0.3, 5).unwrap();
     let rows = advection(&set, Sign::Minus, 14).unwrap();

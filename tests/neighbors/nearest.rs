@@ -3,8 +3,11 @@
 use crate::cases::cases;
 use crate::properties::properties;
 use parops::testing::{Promise, check_provider, check_provider_against};
-use parops::{BruteForce, CellList, Cutoff, DcPse, Domain, Face, Laplacian, Nearest, Neighbors, Particles, Random};
+use parops::{
+    BruteForce, CellList, Cutoff, DcPse, Domain, Face, Laplacian, Nearest, Neighbors, Particles, Random, Result,
+};
 use proptest::prelude::*;
+use std::time::Instant;
 
 /// Points whose spacing varies by 10^5, a pair at one place, and one point far away.
 fn graded(count: usize, seed: u64) -> Particles<2> {
@@ -108,6 +111,31 @@ fn dense_cluster_in_an_even_set_is_searched_in_cells_of_its_own() {
         let cluster = (2000..4000).filter(|&p| nearest.count(p, nearest.cutoff(p)) == 18);
         assert_eq!(cluster.count(), 2000);
     }
+}
+
+#[test]
+fn order_of_the_particles_does_not_matter_to_the_time() -> Result<()> {
+    // A few far apart where multiples of the golden ratio fall among a dense cluster, or before all others.
+    const COUNT: usize = 20_000;
+    let golden: Vec<usize> =
+        (0..64).map(|i| ((i as f64 * 0.6180339887498949).fract() * COUNT as f64) as usize).collect();
+    let seconds = |apart: &[usize]| {
+        let mut random = Random::new(5);
+        let mut point = |size: f64| [size * random.uniform(), size * random.uniform()];
+        let points = (0..COUNT).map(|i| point(if apart.contains(&i) { 1.0 } else { 1e-9 })).collect();
+        let particles = Particles::<2>::new(points)?;
+        let mut least = f64::INFINITY;
+        for _ in 0..3 {
+            let start = Instant::now();
+            Nearest::build(&particles, &Domain::open(), 12)?;
+            least = least.min(start.elapsed().as_secs_f64());
+        }
+        Ok::<f64, parops::Error>(least)
+    };
+    // 70 times as long where a sample sees those alone.
+    let (first, among) = (seconds(&(0..64).collect::<Vec<_>>())?, seconds(&golden)?);
+    assert!(among < 8.0 * first, "{among} s for {first} s");
+    Ok(())
 }
 
 proptest! {

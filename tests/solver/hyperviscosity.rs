@@ -109,6 +109,25 @@ fn default_hyperviscosity_leaves_next_to_no_growth_where_eigenvalues_are_estimat
 }
 
 #[test]
+fn hyperviscosity_is_found_in_any_unit_of_time() -> Result<()> {
+    let set = Particles::jittered([0.0; 2], [1.0; 2], [12; 2], 0.3, 21)?;
+    let around = Nearest::build(&set, &Domain::periodic([0.0; 2], [1.0; 2])?, 18)?;
+    let damped = |unit: f64| {
+        let scheme = Stabilized::<2, 2>::new(set.spacing()?);
+        let scene = AdvectionDiffusion::<2>::new().advection(VELOCITY.map(|v| v * unit), scheme);
+        let mut run = Eulerian::new(scene, &set, &around, Rk4::new())?;
+        let limits = run.limits(&vec![0.0; set.len()])?;
+        Ok::<f64, parops::Error>(limits.rate(Limit::Hyperviscosity).decay / unit)
+    };
+    let (second, powers) = (damped(1.0)?, [-900, -600, 500, 900]);
+    for unit in powers.map(|power| 2.0_f64.powi(power)) {
+        let found = damped(unit)?;
+        assert!((found / second - 1.0).abs() < 1e-6, "{unit:e}: {found} for {second}");
+    }
+    Ok(())
+}
+
+#[test]
 fn set_on_which_estimates_missed_the_growth_is_carried_for_thousands_of_steps() -> Result<()> {
     let set = Particles::jittered([0.0; 2], [1.0; 2], [12; 2], 0.3, 21)?;
     let around = Nearest::build(&set, &Domain::periodic([0.0; 2], [1.0; 2])?, 18)?;

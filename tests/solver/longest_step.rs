@@ -103,7 +103,11 @@ fn source_that_quickens_during_a_step_bounds_it() -> Result<()> {
 #[test]
 fn longest_step_looks_no_further_than_flow_and_source_are_defined() -> Result<()> {
     type Flow = fn(&[f64; 2], f64) -> [f64; 2];
-    let flows: [Flow; 2] = [|_, t| [1e-6 * t.exp(), 0.0], |_, t| [1e-3 * (1.0 - t / 10.0).sqrt(), 0.0]];
+    let flows: [Flow; 3] = [
+        |_, t| [1e-6 * t.exp(), 0.0],
+        |_, t| [1e-3 * (1.0 - t / 10.0).sqrt(), 0.0],
+        |_, t| [1e-40 * (1.0 - t / 10.0).sqrt(), 0.0],
+    ];
     let set = Particles::lattice([0.0; 2], [1.0; 2], [16; 2])?;
     let upwind = UpwindDcPse::half_stencils();
     let neighbors = Nearest::build(&set, &Domain::periodic([0.0; 2], [1.0; 2])?, upwind.neighbors::<2>()?)?;
