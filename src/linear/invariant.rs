@@ -58,7 +58,8 @@ impl Ordered {
             return change;
         }
         let below: Vec<C> = self.vectors.row(self.values.len() - 1).iter().map(|z| z * (beta / self.scale)).collect();
-        self.scale * reach(&self.triangle, &below, 0, change / self.scale)
+        // A change of the smallest maps may round to 0.
+        self.scale * reach(&self.triangle, &below, 0, (change / self.scale).max(f64::EPSILON))
     }
 
     /// The last entry of the eigenvector of the foremost eigenvalue: by how much it fails to be one of the whole.

@@ -10,7 +10,7 @@ use crate::particles::{Random, reserved};
 /// Restarts over which a foremost eigenvalue must not be overtaken.
 const STEADY: usize = 4;
 
-/// Times what the condition of an eigenvalue says of its error: of a pair that is one eigenvalue torn apart it says half.
+/// Times the residual, since a subspace holds little of what makes an eigenvalue move.
 const MARGIN: f64 = 8.0;
 
 /// What a search found.

@@ -7,7 +7,7 @@ use super::krylov::Search;
 use super::norm::norm;
 use super::pseudospectrum::reach;
 use crate::apply::Apply;
-use crate::error::{Error, LinearError, Result};
+use crate::error::{Error, ErrorKind, LinearError, Result};
 use crate::particles::{Random, reserved};
 
 /// Estimates the rightmost eigenvalue max Re(lambda) and the spectral radius max |lambda| of a linear map u -> A u, from
@@ -18,7 +18,7 @@ use crate::particles::{Random, reserved};
 /// n^2 numbers. None is missed then, but for rounding: they are those of a matrix within eps |A| of this one, which lie far
 /// off where eigenvectors are all but parallel (0.85 for a shift of 200 entries, whose eigenvalues are 0), and are what a run
 /// in rounded numbers sees. Beyond that, two runs of the Krylov-Schur method with m vectors from a fixed
-/// pseudo-random start. Equal maps give equal bits. A run ends when the residual |A x - lambda x| of its unit vector x is
+/// pseudo-random start, and up to two more where growth below 0.1 of the radius may be made by rounding. Equal maps give equal bits. A run ends when the residual |A x - lambda x| of its unit vector x is
 /// below the tolerance times the radius and restarts have not moved lambda by more; the radius is found to 1e-3. Cost: 150
 /// to 500 products where the rightmost eigenvalue stands apart (diffusion; advection that grows fast), with N m^2
 /// operations beside every m of them; memory m + 1 vectors.
@@ -27,7 +27,7 @@ use crate::particles::{Random, reserved};
 /// rightmost eigenvalue stands apart. Amid a spectrum along the imaginary axis (advection with '+', or stabilized) growth
 /// below about 0.01 is missed with m = 32, also by runs that converged, to an eigenvalue further left; with m = 128 the
 /// estimate was within 4e-4 after 3000 products. Among eigenvalues crowded at zero growth below about (10/products)^2 is
-/// missed: an abscissa above its [`error`](Spectrum::error) proves growth, one below proves stability only where
+/// missed: an abscissa far above its [`error`](Spectrum::error) shows growth, one below shows stability only where
 /// [`exact`](Spectrum::exact).
 ///
 /// Defaults: m = 32, tolerance 1e-9, at most 3000 products a run.
@@ -55,15 +55,21 @@ pub struct SpectrumEstimator {
 /// An abscissa below this, over the radius, is rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// One below this may be what rounding tears equal eigenvalues apart by: 0.003 where five have one eigenvector, as 0 has
-/// where rows of order 8 take x^8 to x^6 and so on, and 0.06 in `f32`.
+/// One below this may be what rounding tears equal eigenvalues apart by: 0.004 where five have one eigenvector, as 0 has
+/// where rows of order 8 take x^8 to x^6 and so on, and 0.006 where three have in `f32`.
 const TORN: f64 = 0.1;
 
 /// Times what another rounding moves an eigenvalue by.
 const MARGIN: f64 = 8.0;
 
-/// Roundings of a matrix and of its eigenvalues, in eps of its norm.
-const ROUNDED: f64 = 64.0;
+/// Roundings of eigenvalues, in eps of the norm of the matrix.
+const ROUNDED: f64 = 64.0 * f64::EPSILON;
+
+/// Rounding of products with rows whose weights are rounded themselves, in units of the radius.
+const PRODUCTS: f64 = 128.0 * f64::EPSILON;
+
+/// Other roundings that a run which claims slow growth is made again with: one alone may move a chain by chance too little.
+const AGAIN: u64 = 2;
 
 /// du = A u; one type for all maps, so that a program holds the search once.
 type Product<'a> = dyn FnMut(&[f64], &mut [f64]) -> Result<()> + 'a;
@@ -79,8 +85,8 @@ pub struct Spectrum {
     /// |A x - lambda x| of its unit vector x; the rounding of the matrix where all eigenvalues were found.
     pub residual: f64,
     /// How far left of it residual and rounding let that eigenvalue be, to a factor of some 2: far more where another one has
-    /// nearly the same eigenvector. From below where not [`exact`](Self::exact); 0 where exact and the abscissa is not
-    /// positive.
+    /// nearly the same eigenvector. From below where not [`exact`](Self::exact); 0 where exact and the abscissa is below
+    /// 1e-12 of the radius.
     pub error: f64,
     /// max |lambda|, from below unless exact.
     pub radius: f64,
@@ -119,7 +125,7 @@ impl SpectrumEstimator {
     /// The estimator at its defaults.
     #[inline]
     pub fn new() -> Self {
-        Self { subspace: 32, tolerance: 1e-9, most: 3000, dense: 640, rounding: ROUNDED * f64::EPSILON }
+        Self { subspace: 32, tolerance: 1e-9, most: 3000, dense: 640, rounding: PRODUCTS }
     }
 
     /// Sets the number m of vectors, at least 8.
@@ -142,10 +148,10 @@ impl SpectrumEstimator {
         Self { dense: entries, ..self }
     }
 
-    /// Sets what the entries of the map were rounded to, `f64::EPSILON` but for rows in `f32`.
+    /// Sets what sums of a product are rounded to, in units of the radius, where it is more than in `f64`.
     #[must_use]
     pub(crate) fn rounded(self, epsilon: f64) -> Self {
-        Self { rounding: ROUNDED * epsilon, ..self }
+        Self { rounding: epsilon.max(PRODUCTS), ..self }
     }
 
     /// Sets the residual in units of the radius.
@@ -197,7 +203,7 @@ impl SpectrumEstimator {
         {
             return Ok(spectrum);
         }
-        self.runs(n, apply)
+        self.runs(n, apply, AGAIN)
     }
 
     /// The same of a map whose eigenvalues do not crowd the imaginary axis, as that of diffusion: there runs that converge find
@@ -205,7 +211,7 @@ impl SpectrumEstimator {
     /// and where growth is within the error of the run, as where an eigenvalue 0 of two has one eigenvector.
     pub(crate) fn settle(&self, n: usize, mut apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<Spectrum> {
         if n > 0 && self.is_exact(n) {
-            let found = self.runs(n, &mut apply);
+            let found = self.runs(n, &mut apply, 0);
             let settled = |found: &Spectrum| {
                 !(ROUNDING * found.radius..=found.error.max(TORN * found.radius)).contains(&found.abscissa)
             };
@@ -216,7 +222,8 @@ impl SpectrumEstimator {
         self.found(n, &mut apply)
     }
 
-    fn runs(&self, n: usize, mut apply: &mut Product<'_>) -> Result<Spectrum> {
+    /// Runs for the largest and the rightmost eigenvalue, the latter `again` with other roundings where it claims slow growth.
+    fn runs(&self, n: usize, mut apply: &mut Product<'_>, again: u64) -> Result<Spectrum> {
         let tolerance = self.tolerance.max(1e-3);
         let outer = Search { subspace: self.subspace, tolerance, rounding: self.rounding, most: self.most };
         let largest = outer.run(n, &mut apply, |value| value.norm(), 0.0)?;
@@ -227,19 +234,29 @@ impl SpectrumEstimator {
         let radius = largest.value.norm().max(rightmost.value.norm());
         let abscissa = rightmost.value.re;
         let (mut error, mut applies) = (rightmost.error, largest.applies + rightmost.applies);
-        if abscissa > ROUNDING * radius + error && abscissa <= TORN * radius {
+        for seed in 0..again {
+            if !(abscissa > ROUNDING * radius + error && abscissa <= TORN * radius) {
+                break;
+            }
             // What rounding, or what the run leaves, has torn from its like is elsewhere after another rounding.
-            let (size, mut random) = (rightmost.residual.max(self.rounding * radius), Random::new(0x7042));
+            let (size, mut random) = (rightmost.residual.max(self.rounding * radius), Random::new(seed));
             let change: Vec<f64> = (0..n).map(|_| size * random.uniform().mul_add(2.0, -1.0)).collect();
             let mut rounded: &mut Product<'_> = &mut |u, du| {
                 apply(u, du)?;
                 du.iter_mut().zip(u).zip(&change).for_each(|((du, u), change)| *du += change * u);
                 Ok(())
             };
-            // Where that finds no eigenvalues all is open.
-            let other = right.run(n, &mut rounded, key, radius).ok();
-            error = error.max(other.map_or(abscissa, |other| MARGIN * (other.value.re - abscissa).abs()));
-            applies += other.map_or(0, |other| other.applies);
+            match right.run(n, &mut rounded, key, radius) {
+                // Where that finds no eigenvalues all is open.
+                Err(error) if !matches!(error.kind(), ErrorKind::Linear(LinearError::NotConverged { .. })) => {
+                    return Err(error);
+                }
+                Err(_) => error = error.max(abscissa),
+                Ok(other) => {
+                    error = error.max(MARGIN * (other.value.re - abscissa).abs());
+                    applies += other.applies;
+                }
+            }
         }
         Ok(Spectrum {
             abscissa,
@@ -275,7 +292,8 @@ fn all(n: usize, apply: &mut impl FnMut(&[f64], &mut [f64]) -> Result<()>, round
     let radius = scale * (0..n).fold(0.0, |radius: f64, i| radius.max(value(i).norm()));
     let (abscissa, frequency) = (scale * value(first).re, scale * value(first).im.abs());
     let doubtful = abscissa > ROUNDING * radius;
-    let error = if doubtful { scale * reach(&triangle, &[], first, rounding) } else { 0.0 };
+    let change = (rounding * radius / scale).max(ROUNDED);
+    let error = if doubtful { scale * reach(&triangle, &[], first, change) } else { 0.0 };
     let (residual, applies, converged, exact) = (f64::EPSILON * scale, n, true, true);
     Ok(Some(Spectrum { abscissa, frequency, residual, error, radius, applies, converged, exact }))
 }

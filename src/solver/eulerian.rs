@@ -141,7 +141,7 @@ impl<const D: usize, S: Scene<D>, St: TimeScheme<D, S>> Eulerian<D, S, St> {
     /// # Errors
     /// As [`limits`](Self::limits).
     pub fn longest_step(&mut self, u: &[S::Value]) -> Result<f64> {
-        longest(|dt| {
+        longest(self.t, |dt| {
             // A step may come to where the source is not defined, but is not named as one that is legal there.
             self.discrete.source_limits(self.t + dt, u)?;
             let limits = self.limits_of(self.t, dt, u)?;

@@ -12,9 +12,12 @@ use crate::linear::{Spectrum, SpectrumEstimator};
 /// by, if that is more.
 const LIMIT: f64 = 1e-8;
 
-/// How far right of the spectrum estimates end that did not converge, as amid the imaginary axis, over the radius; their
+/// How far right of the spectrum estimates end amid the imaginary axis that are far from converged, over the radius; their
 /// error where that is less.
 const RESOLUTION: f64 = 0.002;
+
+/// A residual above this, over the radius, is far from converged: the error it allows is no measure of where estimates end.
+const BLURRED: f64 = 1e-6;
 
 /// Vectors of the search where a term oscillates: amid the imaginary axis fewer miss growth.
 const VECTORS: usize = 64;
@@ -77,21 +80,23 @@ impl<const D: usize, S: Scene<D>> SemiDiscrete<D, S> {
         }
         let spectrum = self.spectrum(t)?;
         // Runs along the imaginary axis may converge to an eigenvalue that is not the rightmost.
-        let settled = spectrum.exact || spectrum.converged && !self.oscillates(t)?;
-        recorded::<S::Value>(&spectrum, settled, policy)
+        let oscillates = self.oscillates(t)?;
+        let settled = spectrum.exact || spectrum.converged && !oscillates;
+        let resolution = if oscillates { RESOLUTION } else { f64::INFINITY };
+        recorded::<S::Value>(&spectrum, settled, resolution, policy)
     }
 }
 
 /// The growth rate of a spectrum as the policy wants it; NaN where no growth is found, nor is it `settled` that there is none.
+/// Estimates that are far from converged end at most `resolution` of the radius right of it.
 ///
 /// # Errors
 /// [`SolverError::Growing`] where it is refused.
-fn recorded<E: Fields>(spectrum: &Spectrum, settled: bool, policy: GrowthPolicy) -> Result<f64> {
+fn recorded<E: Fields>(spectrum: &Spectrum, settled: bool, resolution: f64, policy: GrowthPolicy) -> Result<f64> {
     let (rate, radius, limit) = (spectrum.abscissa, spectrum.radius, legal::<E>());
-    // What rounding and residual leave open is no proof of growth. `f32` tears a chain of four apart by more than estimates
-    // amid the axis end.
-    let resolution = RESOLUTION.max(E::EPSILON.powf(0.25));
-    let open = if spectrum.converged { spectrum.error } else { spectrum.error.min(resolution * radius) };
+    // What rounding and residual leave open is no proof of growth.
+    let blurred = spectrum.residual > BLURRED * radius;
+    let open = if blurred { spectrum.error.min(resolution * radius) } else { spectrum.error };
     match (rate - open > limit * radius, policy) {
         (true, GrowthPolicy::Refuse) => Err(SolverError::Growing { rate, radius, limit }.into()),
         (true, _) => Ok(rate),
@@ -118,8 +123,8 @@ impl<const D: usize, S: MovingScene<D>> Moving<D, S> {
         if policy == GrowthPolicy::Unknown {
             return Ok(f64::NAN);
         }
-        let spectrum = self.spectrum(estimator.rounded(S::Value::EPSILON))?;
-        recorded::<S::Value>(&spectrum, spectrum.converged, policy)
+        let spectrum = self.spectrum(estimator)?;
+        recorded::<S::Value>(&spectrum, spectrum.converged, RESOLUTION, policy)
     }
 }
 

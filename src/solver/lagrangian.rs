@@ -249,7 +249,7 @@ impl<const D: usize, S: MovingScene<D>, St: Stepper<MovingState<D, S::Value>>> L
     /// # Errors
     /// As [`limits`](Self::limits).
     pub fn longest_step(&mut self) -> Result<f64> {
-        longest(|dt| {
+        longest(self.t, |dt| {
             let limits = self.limits_of(self.t, dt, None)?.0;
             // A step may come to where the source is not defined, but is not named as one that is legal there.
             self.moving.source_limits(self.t + dt)?;

@@ -3,9 +3,9 @@
 use super::policy::StepPolicy;
 use crate::error::{Limit, Result, SolverError};
 
-/// The longest step that is legal, from the limit of a step of a given length, its ends looked at: of decreasing ones the
+/// The longest step that is legal from t on, from the limit of a step of a given length, its ends looked at: of decreasing ones the
 /// first that its own limit admits.
-pub(super) fn longest(mut limit: impl FnMut(f64) -> Result<f64>) -> Result<f64> {
+pub(super) fn longest(t: f64, mut limit: impl FnMut(f64) -> Result<f64>) -> Result<f64> {
     let mut dt = limit(0.0)?;
     for turn in 0.. {
         if !(dt > 0.0 && dt.is_finite()) {
@@ -13,7 +13,7 @@ pub(super) fn longest(mut limit: impl FnMut(f64) -> Result<f64>) -> Result<f64> 
         }
         let found = match limit(dt) {
             // Flow or coefficients may not be defined so far ahead.
-            Err(_) if 0.5 * dt > 0.0 => 0.5 * dt,
+            Err(_) if t + 0.5 * dt != t => 0.5 * dt,
             found => found?,
         };
         if !(found < dt) {

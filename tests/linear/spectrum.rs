@@ -226,6 +226,22 @@ fn chain_torn_by_rounding_is_within_its_error() -> Result<()> {
 }
 
 #[test]
+fn maps_of_subnormal_numbers_are_found_too() -> Result<()> {
+    for scale in [1e-309, 1e-312, 1e-318] {
+        for n in [1, 5, 40] {
+            let low = (1..n).map(|i| (i, i - 1, 0.1 * scale));
+            let entries = (0..n).map(|i| (i, i, -scale * (i + 1) as f64 / n as f64)).chain(low);
+            let matrix = CsrMatrix::from_triplets(n, n, entries)?;
+            for estimator in [SpectrumEstimator::new(), SpectrumEstimator::new().dense(0)] {
+                let found = estimator.of(&matrix)?;
+                assert!((found.radius / scale - 1.0).abs() < 0.01 && found.abscissa < 0.0, "{scale:e} {n} {found:?}");
+            }
+        }
+    }
+    Ok(())
+}
+
+#[test]
 fn slow_growth_that_stands_apart_is_no_rounding() -> Result<()> {
     for (n, growth) in [(120, 1e-3), (120, 0.05), (700, 1e-3), (700, 1e-6)] {
         let lambda = |i: usize| if i == 0 { growth } else { -(i as f64) / n as f64 };
