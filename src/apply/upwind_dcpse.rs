@@ -15,14 +15,15 @@ use crate::stencil::Side;
 /// biased, not halved: the n = 2 l neighbors nearest to the point m one spacing h upstream along the axis, with the window
 /// exp(-|x_q - x_m|^2/epsilon^2) centered there and the monomials at the particle; at least half of them must lie
 /// upstream. epsilon is the cutoff over [`CUTOFF_OVER_EPSILON`](crate::CUTOFF_OVER_EPSILON). Rows are exact for
-/// polynomials of degree 2 and 3; certificate, report and growth are those of [`DcPse`]. They do not depend on the velocity: one row for every axis and side, 2 D n
-/// weights a particle; n = 4, 10, 18 for order 2 and 6, 18, 38 for order 3 in 1, 2, 3 dimensions.
+/// polynomials of degree 2 and 3; certificate, report and growth are those of [`DcPse`]. They do not depend on the
+/// velocity: one row for every axis and side, 2 D n weights a particle; n = 4, 10, 18 for order 2 and 6, 18, 38 for
+/// order 3 in 1, 2, 3 dimensions.
 ///
 /// Spectra of -v . grad on periodic sets in 2D of jitter to 0.1 h lie left of the imaginary axis for both orders, 400 cases
 /// each; at 0.3 h modes grow in 2 to 4 % of the cases by half-stencils, mostly of flows along an axis, and in 0.2 to 2 % by
-/// biased ones, at up to 0.15 of the radius: ask [`SpectrumEstimator`](crate::SpectrumEstimator), as runs do by default. Elsewhere RK4 is
-/// stable. Euler is not, at any step that is of use: a wave of number kappa is damped at a rate of order kappa^4 h^3 only,
-/// and Euler lets it grow by (kappa |v| dt)^2/2 a step.
+/// biased ones, at up to 0.15 of the radius: ask [`SpectrumEstimator`](crate::SpectrumEstimator), as runs do by
+/// default. Elsewhere RK4 is stable. Euler is not, at any step that is of use: a wave of number kappa is damped at a
+/// rate of order kappa^4 h^3 only, and Euler lets it grow by (kappa |v| dt)^2/2 a step.
 ///
 /// ```
 /// use parops::{Domain, Nearest, Particles, UpwindDcPse};

@@ -48,8 +48,8 @@ impl<const P: usize, const R: usize> Lambda<P, R> {
     /// Derives the kernel.
     ///
     /// # Errors
-    /// [`KernelError::Lambda`] unless P is even and from 2 to 2R + 1, and [`KernelError::LambdaOverflow`] where a coefficient does not
-    /// fit 128-bit rationals.
+    /// [`KernelError::Lambda`] unless P is even and from 2 to 2R + 1, and [`KernelError::LambdaOverflow`] where a
+    /// coefficient does not fit 128-bit rationals.
     pub fn new() -> Result<Self> {
         let (exactness, regularity) = (P as u64, R as u64);
         if !P.is_multiple_of(2) || P == 0 || P / 2 > R {

@@ -16,12 +16,13 @@ use crate::particles::{Random, reserved};
 ///
 /// Up to 640 entries all eigenvalues are found from the matrix: n products, some 25 n^3 operations (0.1 s at n = 400) and
 /// n^2 numbers. None is missed then, but for rounding: they are those of a matrix within eps |A| of this one, which lie far
-/// off where eigenvectors are all but parallel (0.85 for a shift of 200 entries, whose eigenvalues are 0), and are what a run
-/// in rounded numbers sees. Beyond that, two runs of the Krylov-Schur method with m vectors from a fixed
-/// pseudo-random start, and up to two more where growth below 0.1 of the radius may be made by rounding. Equal maps give equal bits. A run ends when the residual |A x - lambda x| of its unit vector x is
-/// below the tolerance times the radius and restarts have not moved lambda by more; the radius is found to 1e-3. Cost: 150
-/// to 500 products where the rightmost eigenvalue stands apart (diffusion; advection that grows fast), with N m^2
-/// operations beside every m of them; memory m + 1 vectors.
+/// off where eigenvectors are all but parallel (0.85 for a shift of 200 entries, whose eigenvalues are 0), and are what
+/// a run in rounded numbers sees. Beyond that, two runs of the Krylov-Schur method with m vectors from a fixed
+/// pseudo-random start, and up to two more where growth below 0.1 of the radius may be made by rounding. Equal maps
+/// give equal bits. A run ends when the residual |A x - lambda x| of its unit vector x is below the tolerance times the
+/// radius and restarts have not moved lambda by more; the radius is found to 1e-3. Cost: 150 to 500 products where the
+/// rightmost eigenvalue stands apart (diffusion; advection that grows fast), with N m^2 operations beside every m of
+/// them; memory m + 1 vectors.
 ///
 /// Accuracy of the runs on sets of 144 to 1024 particles, against dense eigenvalues, in units of the radius: 1e-9 where the
 /// rightmost eigenvalue stands apart. Amid a spectrum along the imaginary axis (advection with '+', or stabilized) growth
@@ -84,9 +85,9 @@ pub struct Spectrum {
     pub frequency: f64,
     /// |A x - lambda x| of its unit vector x; the rounding of the matrix where all eigenvalues were found.
     pub residual: f64,
-    /// How far left of it residual and rounding let that eigenvalue be, to a factor of some 2: far more where another one has
-    /// nearly the same eigenvector. From below where not [`exact`](Self::exact); 0 where exact and the abscissa is below
-    /// 1e-12 of the radius.
+    /// How far left of it residual and rounding let that eigenvalue be, to a factor of some 2: far more where another
+    /// one has nearly the same eigenvector. From below where not [`exact`](Self::exact); 0 where exact and the abscissa
+    /// is below 1e-12 of the radius.
     pub error: f64,
     /// max |lambda|, from below unless exact.
     pub radius: f64,
@@ -206,9 +207,10 @@ impl SpectrumEstimator {
         self.runs(n, apply, AGAIN)
     }
 
-    /// The same of a map whose eigenvalues do not crowd the imaginary axis, as that of diffusion: there runs that converge find
-    /// the rightmost, at n = 625 in a thirtieth of the time that all eigenvalues take. These are found where no run converges,
-    /// and where growth is within the error of the run, as where an eigenvalue 0 of two has one eigenvector.
+    /// The same of a map whose eigenvalues do not crowd the imaginary axis, as that of diffusion: there runs that
+    /// converge find the rightmost, at n = 625 in a thirtieth of the time that all eigenvalues take. These are found
+    /// where no run converges, and where growth is within the error of the run, as where an eigenvalue 0 of two has one
+    /// eigenvector.
     pub(crate) fn settle(&self, n: usize, mut apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<Spectrum> {
         if n > 0 && self.is_exact(n) {
             let found = self.runs(n, &mut apply, 0);
@@ -222,7 +224,8 @@ impl SpectrumEstimator {
         self.found(n, &mut apply)
     }
 
-    /// Runs for the largest and the rightmost eigenvalue, the latter `again` with other roundings where it claims slow growth.
+    /// Runs for the largest and the rightmost eigenvalue, the latter `again` with other roundings where it claims slow
+    /// growth.
     fn runs(&self, n: usize, mut apply: &mut Product<'_>, again: u64) -> Result<Spectrum> {
         let tolerance = self.tolerance.max(1e-3);
         let outer = Search { subspace: self.subspace, tolerance, rounding: self.rounding, most: self.most };

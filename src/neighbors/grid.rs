@@ -2,8 +2,8 @@
 
 use crate::error::{NeighborError, Result};
 
-/// Cell i of an axis holds the coordinates from lower + i * width on (axis by axis). Numbers are monotone in the coordinate whatever
-/// the rounding, so that a range of coordinates is always inside the range of its cells.
+/// Cell i of an axis holds the coordinates from lower + i * width on (axis by axis). Numbers are monotone in the
+/// coordinate whatever the rounding, so that a range of coordinates is always inside the range of its cells.
 #[derive(Clone, Debug)]
 pub(super) struct Grid<const D: usize> {
     lower: [f64; D],

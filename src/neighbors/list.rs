@@ -48,7 +48,8 @@ impl<const D: usize> NeighborList<D> {
     /// The rows of another provider, up to its reach. Every row is searched once and stored without spare room.
     ///
     /// # Errors
-    /// [`ParticleError::TooMany`](crate::ParticleError::TooMany), [`ParticleError::Memory`](crate::ParticleError::Memory) where the list does not fit.
+    /// [`ParticleError::TooMany`](crate::ParticleError::TooMany),
+    /// [`ParticleError::Memory`](crate::ParticleError::Memory) where the list does not fit.
     pub fn from_provider(provider: &impl Neighbors<D>) -> Result<Self> {
         provider.stored()
     }
@@ -100,7 +101,8 @@ impl<const D: usize> NeighborList<D> {
     /// [`NeighborError::OwnCenter`] for the target itself (source and zero separation),
     /// [`NeighborError::Repeated`] for the same image twice,
     /// [`ParticleError::Length`](crate::ParticleError::Length) where there is not one offset more than centers,
-    /// [`ParticleError::TooMany`](crate::ParticleError::TooMany), [`ParticleError::Memory`](crate::ParticleError::Memory) where the list does not fit.
+    /// [`ParticleError::TooMany`](crate::ParticleError::TooMany),
+    /// [`ParticleError::Memory`](crate::ParticleError::Memory) where the list does not fit.
     pub fn from_rows(
         sources: usize,
         centers: &[Option<usize>],

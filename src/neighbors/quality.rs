@@ -16,9 +16,9 @@ use crate::scale::Cutoff;
 /// d_p = |sum_q W(s_pq) s_pq| / sum_q W(s_pq) |s_pq|,   W(s) = (1 - |s|^2/r_c^2)^2,   s_pq = x_p - x_q
 /// ```
 ///
-/// 0 on lattices, about 0.027 for a jitter of 0.1 h and 0.08 for 0.3 h where r_c holds 20 neighbors in two dimensions, and towards 1 where
-/// all neighbors lie on one side, as at open faces. It is proportional to small displacements, so that its growth is
-/// theirs.
+/// 0 on lattices, about 0.027 for a jitter of 0.1 h and 0.08 for 0.3 h where r_c holds 20 neighbors in two dimensions,
+/// and towards 1 where all neighbors lie on one side, as at open faces. It is proportional to small displacements, so
+/// that its growth is theirs.
 ///
 /// ```
 /// use parops::{Cutoff, Domain, Particles, SetQuality};

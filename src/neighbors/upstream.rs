@@ -41,7 +41,8 @@ impl<'a, P> Upstream<'a, P> {
     /// The k nearest neighbors on this side of the plane through the target.
     ///
     /// # Errors
-    /// [`NeighborError::Axis`] for an axis that does not exist; [`ParticleError::Memory`](crate::ParticleError::Memory) where there is no room for a cutoff per target.
+    /// [`NeighborError::Axis`] for an axis that does not exist; [`ParticleError::Memory`](crate::ParticleError::Memory)
+    /// where there is no room for a cutoff per target.
     pub fn half<const D: usize>(provider: &'a P, axis: usize, side: Side, k: usize) -> Result<Self>
     where
         P: Neighbors<D>,

@@ -14,8 +14,8 @@ pub const CONTRAST_LIMIT: f64 = 10.0;
 /// The mean of two diffusivities that a pair exchanges with; both are D where the two are equal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mean {
-    /// (D_p + D_q)/2, for smooth D. **Across a contrast above [`CONTRAST_LIMIT`] in a stencil it is several times less accurate than the
-    /// harmonic mean, and at orders above 2 some modes grow there**.
+    /// (D_p + D_q)/2, for smooth D. **Across a contrast above [`CONTRAST_LIMIT`] in a stencil it is several times less
+    /// accurate than the harmonic mean, and at orders above 2 some modes grow there**.
     #[default]
     Arithmetic,
     /// 2 D_p D_q/(D_p + D_q), zero where either is zero: two layers in series, so that the flux through a jump of D is

@@ -43,8 +43,9 @@ pub(crate) struct Design {
 ///
 /// Exact for constants with '-'. The error is O(epsilon^r) + epsilon^(1-m) O((h/epsilon)^s): on lattices the second
 /// part is below round-off from h/epsilon = 1/2 on; **on scattered particles it does not fall with h**, it grows: by M_1
-/// f'/epsilon for a second derivative, see [`RowReport::lower_moment`](crate::RowReport::lower_moment). Conserves sum_p V_p (Q f)_p to round-off for one global epsilon ('-' even, '+' odd).
-/// Needs volumes. Costs one exponential a pair and output.
+/// f'/epsilon for a second derivative, see [`RowReport::lower_moment`](crate::RowReport::lower_moment). Conserves sum_p
+/// V_p (Q f)_p to round-off for one global epsilon ('-' even, '+' odd). Needs volumes. Costs one exponential a pair and
+/// output.
 ///
 /// At build every row is checked: h/epsilon against the limit of the kernel (errata 7), and the discrete moments
 /// M_beta (images counted without their sign; with '+' also |M_0|) against [`moment_tolerance`](Self::moment_tolerance).

@@ -7,9 +7,9 @@ use crate::scale::Spacing;
 impl<const D: usize> Particles<D> {
     /// An estimate of the spacing h.
     ///
-    /// With volumes: h = (1/N) sum_p V_p^(1/D), which is V^(1/D) to two roundings where they are equal. Without: the solution of prod_i (L_i / h + 1) = N, where L_i are the
-    /// extents of the bounding box. That is exact for full lattices, and on lines and planes in higher dimensions
-    /// it is the spacing along them.
+    /// With volumes: h = (1/N) sum_p V_p^(1/D), which is V^(1/D) to two roundings where they are equal. Without: the
+    /// solution of prod_i (L_i / h + 1) = N, where L_i are the extents of the bounding box. That is exact for full
+    /// lattices, and on lines and planes in higher dimensions it is the spacing along them.
     ///
     /// ```
     /// use parops::Particles;

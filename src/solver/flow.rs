@@ -199,6 +199,13 @@ impl<'a, V: Velocity<D>, const D: usize> Gradients<'a, V, D> {
 fn largest_singular_value<const D: usize>(mut a: [[f64; D]; D]) -> f64 {
     /// Sweeps: convergence is quadratic, and 6 serve for any matrix of this size.
     const SWEEPS: usize = 12;
+    let size = a.iter().flatten().map(|x| x.abs()).fold(0.0, f64::max);
+    if size == 0.0 || !size.is_finite() {
+        return a.iter().flatten().map(|x| x.abs()).sum();
+    }
+    // Squares of any scale: a power of 2 rounds nothing.
+    let unit = size.log2().floor().min(1023.0).exp2();
+    a.iter_mut().flatten().for_each(|x| *x /= unit);
     let column = |a: &[[f64; D]; D], i: usize, j: usize| a.iter().map(|row| row[i] * row[j]).sum::<f64>();
     for _ in 0..SWEEPS {
         let mut rotated = false;
@@ -226,7 +233,7 @@ fn largest_singular_value<const D: usize>(mut a: [[f64; D]; D]) -> f64 {
         // A plain maximum would pass over what is not a number.
         if square.is_nan() || most.is_nan() { f64::NAN } else { most.max(square) }
     });
-    square.sqrt()
+    unit * square.sqrt()
 }
 
 #[cfg(test)]
@@ -242,6 +249,16 @@ mod tests {
         assert!((largest_singular_value([[-1.0; 2]; 2]) - 2.0).abs() <= 8.0 * f64::EPSILON);
         assert!((largest_singular_value([[1.0; 3]; 3]) - 3.0).abs() <= 16.0 * f64::EPSILON);
         assert_eq!(largest_singular_value([[0.0; 3]; 3]), 0.0);
-        assert!(largest_singular_value([[f64::NAN, 0.0], [0.0, 1.0]]).is_nan());
+        for unit in [f64::from_bits(1), f64::MIN_POSITIVE, 1e-200, 1e200, 1e308] {
+            let norm = largest_singular_value([[unit, unit], [0.0, unit]]);
+            assert!(
+                (norm / unit - golden).abs() <= 8.0 * f64::EPSILON.max(f64::from_bits(1) / unit),
+                "{unit:e}: {norm:e}"
+            );
+        }
+        assert_eq!(largest_singular_value([[f64::MAX, 0.0], [0.0, 0.0]]), f64::MAX);
+        let beyond = [f64::NAN, f64::INFINITY]
+            .map(|x| [largest_singular_value([[x, 0.0], [0.0, 1.0]]), largest_singular_value([[x; 2]; 2])]);
+        assert!(beyond.as_flattened().iter().all(|norm| !norm.is_finite()), "{beyond:?}");
     }
 }

@@ -3,8 +3,8 @@
 use super::policy::StepPolicy;
 use crate::error::{Limit, Result, SolverError};
 
-/// The longest step that is legal from t on, from the limit of a step of a given length, its ends looked at: of decreasing ones the
-/// first that its own limit admits.
+/// The longest step that is legal from t on, from the limit of a step of a given length, its ends looked at: of
+/// decreasing ones the first that its own limit admits.
 pub(super) fn longest(t: f64, mut limit: impl FnMut(f64) -> Result<f64>) -> Result<f64> {
     let mut dt = limit(0.0)?;
     for turn in 0.. {

@@ -25,8 +25,8 @@ use super::promise_line::{BROKEN, Line};
 /// ```
 ///
 /// # Panics
-/// Every verb panics where its promise is broken, or measured value, bound or unit is not finite, and where promises are recorded and one
-/// test states one of them with two bounds.
+/// Every verb panics where its promise is broken, or measured value, bound or unit is not finite, and where promises
+/// are recorded and one test states one of them with two bounds.
 #[derive(Clone, Debug)]
 #[must_use = "a promise is checked by a bound"]
 pub struct Promise {

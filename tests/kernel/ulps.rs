@@ -2,8 +2,9 @@
 //! eps of the largest value of the kernel.
 //!
 //! Both precisions run the same code, so this measures how it rounds; that it rounds to the right value is shown in
-//! `accuracy.rs`. Four ulps, and eight of a derivative, are what is asked for. No kernel that changes its sign keeps that: near a
-//! zero its terms cancel, and a value has the rounding of the largest ones, which a sum over neighbors sees alone.
+//! `accuracy.rs`. Four ulps, and eight of a derivative, are what is asked for. No kernel that changes its sign keeps
+//! that: near a zero its terms cancel, and a value has the rounding of the largest ones, which a sum over neighbors
+//! sees alone.
 
 use parops::{
     AnisotropicGaussian, Cic, CubicSpline, Exchange, Gaussian, HighOrderGaussian, Kernel, Lambda, LatticeHat,
@@ -23,8 +24,8 @@ const AWAY: f64 = 1e-3;
 const VALUE: f64 = 4.0;
 const DERIVATIVE: f64 = 8.0;
 
-/// A value that is off by `largest` eps of the largest one is off by less than this many ulps where it is above [`AWAY`], as an
-/// ulp is more than eps/2 of a value.
+/// A value that is off by `largest` eps of the largest one is off by less than this many ulps where it is above
+/// [`AWAY`], as an ulp is more than eps/2 of a value.
 fn ulps_of(largest: f64) -> f64 {
     2.0 * largest / AWAY
 }
@@ -44,8 +45,8 @@ fn value_bound(kernel: &str) -> (f64, &'static str) {
 fn most_ulps(kernel: &str) -> (f64, &'static str) {
     match kernel {
         "Gaussian" | "WideGaussian" | "LatticeHat" | "Ngp, Cic and Tsc" => (VALUE, ""),
-        // Five halves of an eps for |z|^2 to the fifth, two for its powers, one and a half for sum, quotient and constant, and
-        // two ulps to the eps.
+        // Five halves of an eps for |z|^2 to the fifth, two for its powers, one and a half for sum, quotient and
+        // constant, and two ulps to the eps.
         "RationalLaplacian" => (12.0, "the fifth power of a rounded square"),
         // r is off by 5/4 eps in three dimensions, and (edge - r)^n by n r/(edge - r) times that: 44 eps of the cubic spline
         // where it is a thousandth, 26 to 36 of the others; four more of the other roundings, and two ulps to the eps.

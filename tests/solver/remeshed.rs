@@ -42,7 +42,8 @@ fn slope(points: &[(f64, f64)]) -> f64 {
     above / below
 }
 
-/// The L2 error at t = 6, before which the finer details of the start still bend the slopes, of u_t + (v u)_x = 0, v = 1 + sin(x)/2, on a ring of n nodes with CFL = 1.5 dt/h.
+/// The L2 error at t = 6, before which the finer details of the start still bend the slopes, of u_t + (v u)_x = 0, v =
+/// 1 + sin(x)/2, on a ring of n nodes with CFL = 1.5 dt/h.
 fn compressive<const P: usize, const R: usize, const S: usize>(n: usize, cfl: f64) -> (f64, f64)
 where
     Lambda<P, R>: MeshKernel<f64, S>,
