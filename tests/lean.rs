@@ -152,9 +152,10 @@ impl Transport<2> for Counted {
         site: &Site<2>,
         flow: impl Fn(usize) -> [f64; 2] + Sync,
         steady: bool,
+        solenoidal: bool,
         neighbors: &P,
     ) -> Result<CountedRows<E>> {
-        self.0.build(site, flow, steady, neighbors).map(CountedRows)
+        self.0.build(site, flow, steady, solenoidal, neighbors).map(CountedRows)
     }
 }
 
@@ -301,8 +302,8 @@ fn upwind_takes_rows_and_places_and_sweeps_once_a_step() -> Result<()> {
     let scene = AdvectionDiffusion::<2>::new().advection(wind, Counted(upwind));
     let (run, build) = cost(|| Eulerian::new(scene, &set, &neighbors, Euler::new()));
     let mut run = run?;
-    // Two weights a pair serve any velocity; four bytes say which sides a particle has.
-    let expected = rows(pairs(&neighbors, |_| cutoff.0), 2.0) + POINT + 4.0;
+    // Two weights a pair serve any velocity; a row sum for each of four sides bounds the step where the flow comes from.
+    let expected = rows(pairs(&neighbors, |_| cutoff.0), 2.0) + POINT + 4.0 * NUMBER;
     exactly("an upwind scene", build.held, expected);
     assert!(build.peak <= expected * (1.0 + BLOCK), "{build:?}");
     // Drafts of up to 32 neighbors: 4, 4, 3 and 1 as above. Scratch are weights that grow once more in every draft

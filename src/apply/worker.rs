@@ -186,7 +186,8 @@ fn mend<const D: usize, M: Method<D>, P: Neighbors<D>>(
             Err(_) => {}
         }
     }
-    let wanted = GROWTH * draft.stencil.cutoff();
+    // Where all neighbors lie at one place no factor helps.
+    let wanted = Some(GROWTH * draft.stencil.cutoff()).filter(|&wanted| wanted > 0.0 && admits(neighbors, wanted));
     method.stand_in(draft, scratch);
     match &mut draft.report {
         Ok(report) => {
@@ -197,8 +198,10 @@ fn mend<const D: usize, M: Method<D>, P: Neighbors<D>>(
             let refusal = refusal.clone().at(p);
             Err(match lack(neighbors, &draft.stencil, &refusal) {
                 Some((found, needed)) => refusal.lacking(found, needed),
-                None if method.can_grow(&refusal) && !limited && admits(neighbors, wanted) => refusal.wanting(wanted),
-                None => refusal,
+                None => match wanted.filter(|_| !limited && method.can_grow(&refusal)) {
+                    Some(wanted) => refusal.wanting(wanted),
+                    None => refusal,
+                },
             })
         }
     }

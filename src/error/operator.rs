@@ -103,6 +103,11 @@ kinds! {
             /// Rank of the conditions on this stencil.
             rank: usize,
         } => "the {neighbors} neighbors give the {conditions} moment conditions rank {rank} only",
+        /// No neighbor but at the place of the particle.
+        OnePlace {
+            /// Number of neighbors n.
+            neighbors: usize,
+        } => "all {neighbors} neighbors lie at the place of the particle",
         /// Fewer neighbors than the moment conditions need.
         TooFew {
             /// Number of neighbors n.

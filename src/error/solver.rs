@@ -120,6 +120,11 @@ kinds! {
             /// Time.
             t: f64,
         } => "the largest singular value of the velocity gradient at t = {t} is {value}",
+        /// A divergence of the velocity that is to be computed by a scheme without central rows, as upwind ones are.
+        NoDivergence {
+            /// Time.
+            t: f64,
+        } => "the divergence of the velocity at t = {t} is to be computed by the advection scheme, which has no central rows: give it as a function",
         /// A divergence of the velocity that is not finite.
         Divergence {
             /// The divergence.
@@ -168,13 +173,13 @@ kinds! {
             /// Number of particles.
             particles: usize,
         } => "nothing fixes the level of u at the {particles} particles: give a value somewhere, a Robin condition or a source that decays",
-        /// No neighbor upstream, and no inflow condition.
+        /// Too few neighbors upstream for a row, and no inflow condition.
         NoUpstream {
             /// Axis along which the flow comes in, or the nearest one.
             axis: usize,
             /// The velocity along it.
             velocity: f64,
-        } => "nothing lies upstream along axis {axis}, where the velocity is {velocity}: an inflow condition is needed",
+        } => "too little lies upstream along axis {axis} for a row, where the velocity is {velocity}: the value must be given there, by an inflow condition, at as many particles as the stencil reaches over",
         /// A volume of a moving particle that is not positive: it was compressed to nothing within a step.
         Volume {
             /// The volume.

@@ -48,7 +48,7 @@ kinds! {
             low: f64,
             /// Largest legal slope.
             high: f64,
-        } => "eigenvalues beside the real axis by a slope of {slope}, which is outside {low} to {high}",
+        } => "a slope of {slope} for eigenvalues beside the real axis is outside {low} to {high}; rows that are not symmetric, as those of DC-PSE, need one",
         /// A right-hand side or state that is not finite.
         NotFinite {
             /// Stage of the stepper, from 1; one past the last for the new state.

@@ -71,11 +71,11 @@ fn length(x: &[C]) -> f64 {
 /// Turns row i of a triangle and the row below it such that entry i of the latter is 0.
 fn fold(r: &mut DMatrix<C>, below: &mut [C], i: usize) {
     let (p, q) = (r[(i, i)], below[i]);
-    let length = (p.norm_sqr() + q.norm_sqr()).sqrt();
-    if length == 0.0 {
+    let hypotenuse = (p.norm_sqr() + q.norm_sqr()).sqrt();
+    if hypotenuse == 0.0 {
         return;
     }
-    let (p, q) = (p / length, q / length);
+    let (p, q) = (p / hypotenuse, q / hypotenuse);
     for j in i..below.len() {
         let (x, y) = (r[(i, j)], below[j]);
         r[(i, j)] = p.conj() * x + q.conj() * y;
@@ -116,6 +116,16 @@ mod tests {
                 assert!((1.0 - 1e-9..1.2).contains(&(found / exact)), "{seed} {z}: {found:e} for {exact:e}");
             }
         }
+    }
+
+    #[test]
+    fn what_lies_outside_of_the_subspace_shortens_the_reach() {
+        // [T - z; w^T] with w along the vector of a chain: |w| bounds the smallest singular value from below.
+        let chain = DMatrix::from_fn(3, 3, |i, j| C::new(f64::from(u8::from(j == i + 1)), 0.0));
+        let below = [C::new(1e-3, 0.0), C::new(0.0, 0.0), C::new(0.0, 0.0)];
+        assert!(reach(&chain, &[], 0, 1e-6) > 1e-2);
+        assert_eq!(reach(&chain, &below, 0, 1e-6), 2e-6);
+        assert!(reach(&chain, &below, 0, 2e-3) > 0.1);
     }
 
     #[test]

@@ -25,6 +25,9 @@ const STEPS: usize = 16;
 /// First moments across below this part of their absolute terms are rounding of the sum.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
+/// A component below this part of a separation is rounding, as that of lattices which are turned.
+const ACROSS: f64 = 1e-12;
+
 /// The settings of one-sided derivatives.
 #[derive(Clone, Debug)]
 pub(super) struct HalfSpace {
@@ -128,14 +131,12 @@ impl<const D: usize> HalfScratch<D> {
     /// [`OperatorError::EmptySide`] without a source on that side.
     pub(super) fn slope(&mut self, axis: usize, side: Side) -> Result<()> {
         let Self { z, volume, w, defect } = self;
-        let sign = side.sign();
         let mut empty = true;
         for ((w, z), &volume) in w.iter_mut().zip(z.iter()).zip(volume.iter()) {
-            let along = sign * z[axis];
             *w = 0.0;
-            if along > 0.0 {
+            if on_side(z, axis, side) {
                 empty = false;
-                *w = volume * along * (-square(z)).exp();
+                *w = volume * (side.sign() * z[axis]) * (-square(z)).exp();
             }
         }
         if empty {
@@ -156,6 +157,13 @@ impl<const D: usize> HalfScratch<D> {
         }
         Ok(())
     }
+}
+
+/// Whether a separation leads to a side of an axis, and not across it but for the rounding of coordinates.
+#[inline(always)]
+pub(super) fn on_side<const D: usize>(z: &[f64; D], axis: usize, side: Side) -> bool {
+    let along = side.sign() * z[axis];
+    along > 0.0 && along * along > ACROSS * ACROSS * square(z)
 }
 
 #[inline(always)]

@@ -42,4 +42,5 @@ pub(crate) use screened::{Facing, Screen, Screened};
 pub use several::Several;
 pub use sph::{Differentiated, Sph, SphForm};
 pub use typed::{Homogeneous, Plus, Times};
+pub(crate) use upwind::UpwindSides;
 pub use upwind::{Upwind, UpwindGradient, UpwindScratch};

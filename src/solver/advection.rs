@@ -57,7 +57,7 @@ impl<V: Velocity<D>, X: Transport<D>, W: FlowDivergence<D>, const D: usize, E: F
         self.velocity.validate(site.points().len())?;
         let points = site.points();
         let flow = |p: usize| self.velocity.at(p, &points[p], 0.0);
-        let rows = self.scheme.build(site, flow, self.velocity.steady(), neighbors)?;
+        let rows = self.scheme.build(site, flow, self.velocity.steady(), W::ZERO, neighbors)?;
         let divergence = self.divergence.build(&self.scheme, site, neighbors)?;
         let mut built = AdvectionRows { rows, divergence, rates: None };
         if self.velocity.steady() {

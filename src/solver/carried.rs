@@ -28,6 +28,7 @@ impl<const D: usize> Transport<D> for Carried {
         site: &Site<D>,
         _: impl Fn(usize) -> [f64; D] + Sync,
         _: bool,
+        _: bool,
         _: &P,
     ) -> Result<CarriedRows> {
         Err(SolverError::Stays { particles: site.points().len() }.into())

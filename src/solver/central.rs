@@ -121,6 +121,7 @@ macro_rules! central {
                 site: &Site<D>,
                 _: impl Fn(usize) -> [f64; D] + Sync,
                 _: bool,
+                _: bool,
                 neighbors: &P,
             ) -> Result<CentralRows<D, E>> {
                 let of: fn(&Self) -> &_ = $of;

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVectorView, DVectorViewMut};
 
+use super::growth::COMPRESSED;
 use crate::apply::{Hyperviscosity, Rows};
 use crate::error::{Error, ErrorKind, LinearError, Result};
 use crate::linear::{OPEN, SpectrumEstimator, least};
@@ -32,33 +33,49 @@ pub(super) struct Damping<const D: usize> {
 }
 
 impl<const D: usize> Damping<D> {
-    /// gamma for this flow.
+    /// gamma for this flow; beside a term u div v unless it is `solenoidal`.
     ///
     /// # Errors
     /// As [`Hyperviscosity::tune`].
-    pub(super) fn gamma(&mut self, flow: &[[f64; D]]) -> Result<f64> {
+    pub(super) fn gamma(&mut self, flow: &[[f64; D]], solenoidal: bool) -> Result<f64> {
+        let divergence = if solenoidal { vec![0.0; flow.len()] } else { self.divergence(flow) };
+        let fastest = flow.iter().map(length).fold(0.0, f64::max);
+        let left = COMPRESSED / 2.0 * divergence.iter().copied().fold(0.0, f64::max);
+        let growth = if left > 0.0 { left * self.term.spacing().0 / fastest } else { NONE };
+        let coarse = growth.max(GROWTH);
+
         let estimator = SpectrumEstimator::new().subspace(VECTORS).most(PRODUCTS);
         // What the part has to say against the rows, all of them say with their own particles.
-        let part = if estimator.is_exact(flow.len()) { None } else { Some(self.part(flow).unwrap_or(0.0)) };
+        let exact = estimator.is_exact(flow.len());
+        let part = if exact { 0.0 } else { self.part(flow, &divergence, coarse).unwrap_or(0.0) };
         let Self { rows, term } = self;
         let bare = |u: &[f64], du: &mut [f64]| {
             rows.apply_along(flow, u, du)?;
-            du.iter_mut().for_each(|du| *du = -*du);
+            du.iter_mut().zip(u).zip(&divergence).for_each(|((du, u), divergence)| *du = -*du - divergence * u);
             Ok(())
         };
-        match part {
-            None => match term.tune(&estimator, flow, bare, NONE) {
-                Err(error) if grows(&error) => term.tune(&estimator, flow, bare, GROWTH).map(|_| ()),
-                found => found.map(|_| ()),
-            },
+        if exact {
+            match term.tune(&estimator, flow, bare, growth) {
+                Err(error) if grows(&error) => term.tune(&estimator, flow, bare, coarse)?,
+                found => found?,
+            };
+        } else {
             // Estimates of the whole alone miss growth, the more the larger the set is.
-            Some(part) => term.raise(&estimator, flow, bare, GROWTH, part),
-        }?;
+            term.raise(&estimator, flow, bare, coarse, part)?;
+        }
         Ok(term.gamma())
     }
 
+    /// div v by the rows, mirrors left aside.
+    fn divergence(&self, flow: &[[f64; D]]) -> Vec<f64> {
+        let along = |p: usize, (q, w): (usize, [f64; D])| {
+            w.iter().zip(&flow[q]).zip(&flow[p]).map(|((w, v), own)| w * (v - own)).sum::<f64>()
+        };
+        (0..flow.len()).map(|p| self.rows.pairs(p).1.into_iter().map(|pair| along(p, pair)).sum()).collect()
+    }
+
     /// The gamma that the particles around the fastest one need, with the same margin as an estimate of all.
-    fn part(&self, flow: &[[f64; D]]) -> Result<f64> {
+    fn part(&self, flow: &[[f64; D]], divergence: &[f64], growth: f64) -> Result<f64> {
         let Self { rows, term } = self;
         let speed = |p: usize| length(&flow[p]);
         // Far from the rim where all are as fast.
@@ -73,11 +90,12 @@ impl<const D: usize> Damping<D> {
             let along = |w: [f64; D]| -w.iter().zip(&flow[p]).map(|(w, v)| w * v).sum::<f64>();
             let place = |q| places.get(&q).map(|&j| (i, j));
             rows.entries_of(p, along, &mut |q, w| place(q).into_iter().for_each(|at| advection[at] += w));
+            advection[(i, i)] -= divergence[p];
             for (q, w) in term.row(p, speed(p)) {
                 place(q).into_iter().for_each(|at| damping[at] += w);
             }
         }
-        let found = least(speed(fastest) / h, GROWTH, |gamma| {
+        let found = least(speed(fastest) / h, growth, |gamma| {
             SpectrumEstimator::new().estimate(size, |u, du| {
                 let u = DVectorView::from_slice(u, size);
                 let mut du = DVectorViewMut::from_slice(du, size);

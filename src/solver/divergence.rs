@@ -36,8 +36,8 @@ pub trait FlowDivergence<const D: usize>: Sync {
     /// steady flow. `of(p, v)` is the divergence of the velocities v at particle p by the rows of the scheme.
     ///
     /// # Errors
-    /// [`SolverError::Divergence`] naming the particle, with a value that is NaN where the scheme has no rows for it;
-    /// [`SolverError::CrossesMirror`] naming a particle beside a mirror that the flow crosses.
+    /// [`SolverError::Divergence`] naming the particle where it is not finite; [`SolverError::NoDivergence`] where the scheme
+    /// has no rows for it; [`SolverError::CrossesMirror`] naming a particle beside a mirror that the flow crosses.
     fn refresh(
         &self,
         values: &mut Self::Values,
@@ -209,7 +209,7 @@ impl<const D: usize> FlowDivergence<D> for ComputedDivergence {
                 Some(walls) => walls.divergence(p, v),
                 None => of(p, v),
             };
-            let value = value.unwrap_or(f64::NAN);
+            let value = value.ok_or_else(|| Error::from(SolverError::NoDivergence { t }).at(p))?;
             if !value.is_finite() {
                 return Err(Error::from(SolverError::Divergence { value, t }).at(p));
             }

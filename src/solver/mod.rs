@@ -35,6 +35,7 @@ mod saved;
 mod scene;
 mod scheme;
 mod semi_discrete;
+mod sides;
 mod source;
 mod stabilized;
 mod steady;

@@ -22,8 +22,9 @@ pub enum StepPolicy {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum GrowthPolicy {
-    /// The largest growth rate is estimated when the rows are made, and refused above 1e-8 of the spectral radius: again where
-    /// a flow has become twice as fast, or particles have moved to other neighbors, but not where a flow only turns.
+    /// The largest growth rate is estimated when the rows are made, and refused above 1e-8 of the spectral radius; beside
+    /// a term u div v above max div v/10, since truncation moves eigenvalues from zero there. Again where a flow has become
+    /// twice as fast, or particles have moved to other neighbors, but not where a flow only turns.
     #[default]
     Refuse,
     /// It is estimated, and the ledger records it.

@@ -110,8 +110,8 @@ impl<const D: usize, E: Fields, K, V, X, S, B> AdvectionDiffusion<D, E, (K, Adve
         self.with_divergence(GivenDivergence(divergence))
     }
 
-    /// Adds -u div v, with div v by the central rows of the scheme; mirrors turn the normal component of v, see
-    /// [`ComputedDivergence`].
+    /// Adds -u div v, with div v by the rows of the scheme, which must be central ones; mirrors turn the normal component
+    /// of v, see [`ComputedDivergence`].
     #[must_use]
     pub fn computed_divergence(self) -> Compressible<D, E, K, V, X, ComputedDivergence, S, B> {
         self.with_divergence(ComputedDivergence)

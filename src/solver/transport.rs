@@ -26,7 +26,7 @@ pub trait Transport<const D: usize>: Sync {
     const APPLIES: usize;
 
     /// Makes the rows. `flow` gives the velocity of every particle at the start of the run, for schemes that look
-    /// upstream; `steady` says whether it stays.
+    /// upstream; `steady` says whether it stays, `solenoidal` whether the scene has no term u div v.
     ///
     /// # Errors
     /// As [`Rows::assemble`].
@@ -35,6 +35,7 @@ pub trait Transport<const D: usize>: Sync {
         site: &Site<D>,
         flow: impl Fn(usize) -> [f64; D] + Sync,
         steady: bool,
+        solenoidal: bool,
         neighbors: &P,
     ) -> Result<Self::Rows<E>>;
 

@@ -4,13 +4,15 @@ use num_traits::AsPrimitive;
 
 use super::fields::Fields;
 use super::limits::Rate;
+use super::sides::{Sides, still};
 use super::term::Site;
 use super::transport::{Transport, TransportRows};
 use crate::apply::{Report, Rows};
-use crate::error::{Error, Result, SolverError};
+use crate::error::Result;
 use crate::neighbors::Neighbors;
-use crate::operator::UpwindGradient;
+use crate::operator::{UpwindGradient, UpwindSides};
 use crate::scalar::{Scalar, length};
+use crate::stencil::Side;
 
 /// The rows of the upwind scheme of order 1, for any velocity.
 ///
@@ -21,24 +23,7 @@ use crate::scalar::{Scalar, length};
 #[derive(Clone, Debug)]
 pub struct OneSidedRows<const D: usize, E: Fields> {
     rows: Rows<[f64; D], E::Scalar>,
-    /// The largest row sum of either side, axis by axis.
-    sums: [f64; D],
-    /// Bit 2 i is set where particle p has weights of the left along axis i, bit 2 i + 1 where it has some of the right.
-    sides: Vec<u32>,
-}
-
-/// The bit of the side that a component v of axis i comes from; none for v = 0.
-#[inline(always)]
-fn bit(axis: usize, v: f64) -> u32 {
-    if v == 0.0 { 0 } else { 1 << (2 * axis + usize::from(v < 0.0)) }
-}
-
-impl<const D: usize, E: Fields> OneSidedRows<D, E> {
-    /// The first axis along which v comes from a side without weights.
-    fn unserved(&self, p: usize, v: &[f64; D]) -> Option<usize> {
-        let sides = self.sides.get(p).copied().unwrap_or(0);
-        v.iter().enumerate().position(|(axis, &v)| bit(axis, v) & !sides != 0)
-    }
+    sides: Sides<D>,
 }
 
 impl<const D: usize> Transport<D> for UpwindGradient<D> {
@@ -50,25 +35,28 @@ impl<const D: usize> Transport<D> for UpwindGradient<D> {
         site: &Site<D>,
         flow: impl Fn(usize) -> [f64; D] + Sync,
         steady: bool,
+        _: bool,
         neighbors: &P,
     ) -> Result<OneSidedRows<D, E>> {
-        let rows: Rows<[f64; D], E::Scalar> = Rows::assemble(&site.screened(self), neighbors)?;
-        let (mut sums, mut sides) = ([0.0_f64; D], vec![0; rows.targets()]);
-        for (p, sides) in sides.iter_mut().enumerate() {
-            let mut own = [[0.0_f64; 2]; D];
+        let still = still((0..site.points().len()).map(&flow));
+        // A steady flow leaves out the sides it does not come from.
+        let from = |v: f64, side| v.abs() > still && Side::upwind(v) == Some(side);
+        let wanted = |p: usize, axis: usize, side| !steady || from(flow(p)[axis], side);
+        let method = UpwindSides { gradient: self, wanted };
+        let rows: Rows<[f64; D], E::Scalar> = Rows::assemble(&site.screened(&method), neighbors)?;
+        let sums = |p| {
+            let mut sums = [[0.0_f64; 2]; D];
             for (_, w) in rows.pairs(p).1 {
-                for (axis, (own, w)) in own.iter_mut().zip(w).enumerate() {
+                for (sums, w) in sums.iter_mut().zip(w) {
                     let w: f64 = w.as_();
                     // A weight below zero serves a velocity from the left.
-                    *sides |= bit(axis, -w);
-                    own[usize::from(w > 0.0)] += w.abs();
+                    sums[usize::from(w > 0.0)] += w.abs();
                 }
             }
-            for (sum, own) in sums.iter_mut().zip(own) {
-                *sum = own.iter().fold(*sum, |most, own| most.max(*own));
-            }
-        }
-        let built = OneSidedRows { rows, sums, sides };
+            sums
+        };
+        let sides = Sides::new(rows.targets(), still, sums);
+        let built = OneSidedRows { rows, sides };
         if steady {
             site.free().try_for_each(|(p, _)| built.rate(p, &flow(p)).map(|_: Rate| ()))?;
         }
@@ -84,7 +72,7 @@ impl<const D: usize, E: Fields> TransportRows<D, E> for OneSidedRows<D, E> {
     #[inline(always)]
     fn along(&self, p: usize, v: &[f64; D], u: &[E]) -> E {
         let (zero, own, mut sum) = (E::Scalar::lift(0.0), u[p], E::ZERO);
-        if self.unserved(p, v).is_some() {
+        if !v.iter().enumerate().all(|(axis, &v)| self.sides.serve(p, axis, v)) {
             return E::ZERO.plus_product(E::Scalar::lift(f64::NAN), own);
         }
         let v = v.map(E::Scalar::lift);
@@ -100,10 +88,7 @@ impl<const D: usize, E: Fields> TransportRows<D, E> for OneSidedRows<D, E> {
     }
 
     fn rate(&self, p: usize, v: &[f64; D]) -> Result<Rate> {
-        if let Some(axis) = self.unserved(p, v) {
-            return Err(Error::from(SolverError::NoUpstream { axis, velocity: v[axis] }).at(p));
-        }
-        Ok(Rate::decay(2.0 * v.iter().zip(&self.sums).fold(0.0, |sum, (v, own)| sum + v.abs() * own)))
+        Ok(Rate::decay(2.0 * self.sides.rate(p, v)?))
     }
 
     fn monotone(&self) -> bool {

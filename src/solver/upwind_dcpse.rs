@@ -2,10 +2,11 @@
 
 use super::fields::Fields;
 use super::limits::Rate;
+use super::sides::{Sides, still};
 use super::term::Site;
 use super::transport::{Transport, TransportRows};
 use crate::apply::{Field, Report, Rows, SidedRows, UpwindDcPse};
-use crate::error::{Error, Result, SolverError};
+use crate::error::Result;
 use crate::neighbors::Neighbors;
 use crate::scalar::Scalar;
 use crate::stencil::Side;
@@ -18,8 +19,7 @@ use crate::stencil::Side;
 pub struct UpwindDcPseRows<const D: usize, E: Fields> {
     rows: SidedRows<D, E::Scalar>,
     report: Report,
-    /// The largest row sum of either side, axis by axis.
-    sums: [f64; D],
+    sides: Sides<D>,
 }
 
 impl<const D: usize, E: Fields> UpwindDcPseRows<D, E> {
@@ -46,16 +46,14 @@ impl<const D: usize> Transport<D> for UpwindDcPse {
         site: &Site<D>,
         flow: impl Fn(usize) -> [f64; D] + Sync,
         steady: bool,
+        _: bool,
         neighbors: &P,
     ) -> Result<UpwindDcPseRows<D, E>> {
         let rows: SidedRows<D, E::Scalar> = self.open_sides().assemble_as(neighbors)?;
-        let mut sums = [0.0_f64; D];
-        for (axis, sum) in sums.iter_mut().enumerate() {
-            for rows in [Side::Left, Side::Right].into_iter().filter_map(|side| rows.rows(axis, side)) {
-                *sum = (0..rows.targets()).fold(*sum, |most, p| most.max(row_sum(rows, p)));
-            }
-        }
-        let built = UpwindDcPseRows { report: rows.report(), rows, sums };
+        let sum = |p, axis, side| rows.rows(axis, side).map_or(0.0, |rows| row_sum(rows, p));
+        let sums = |p| std::array::from_fn(|axis| [Side::Left, Side::Right].map(|side| sum(p, axis, side)));
+        let sides = Sides::new(rows.targets(), still((0..site.points().len()).map(&flow)), sums);
+        let built = UpwindDcPseRows { report: rows.report(), rows, sides };
         if steady {
             site.free().try_for_each(|(p, _)| built.rate(p, &flow(p)).map(|_: Rate| ()))?;
         }
@@ -69,17 +67,16 @@ impl<const D: usize, E: Fields> TransportRows<D, E> for UpwindDcPseRows<D, E> {
         let (own, mut sum) = (u[p], E::ZERO);
         for (axis, &v) in v.iter().enumerate() {
             let Some(rows) = self.side(axis, v) else { continue };
-            let (mut slope, mut served) = (E::ZERO, false);
+            let mut slope = E::ZERO;
             let (diagonal, pairs) = rows.pairs(p);
             if let Some([d]) = diagonal {
                 slope = slope.plus_product(d, own);
             }
             for (q, [w]) in pairs {
                 slope = slope.plus_difference(w, u[q], own);
-                served = true;
             }
-            // A row that was left out has no neighbors.
-            sum = sum.plus_product(E::Scalar::lift(if served { v } else { f64::NAN }), slope);
+            let v = if self.sides.serve(p, axis, v) { v } else { f64::NAN };
+            sum = sum.plus_product(E::Scalar::lift(v), slope);
         }
         sum
     }
@@ -93,13 +90,7 @@ impl<const D: usize, E: Fields> TransportRows<D, E> for UpwindDcPseRows<D, E> {
     }
 
     fn rate(&self, p: usize, v: &[f64; D]) -> Result<Rate> {
-        for (axis, &velocity) in v.iter().enumerate() {
-            let empty = |rows: &Rows<[f64; 1], E::Scalar>| rows.row(p).is_none_or(|row| row.sources.is_empty());
-            if self.side(axis, velocity).is_some_and(empty) {
-                return Err(Error::from(SolverError::NoUpstream { axis, velocity }).at(p));
-            }
-        }
-        Ok(Rate::modulus(v.iter().zip(&self.sums).fold(0.0, |sum, (v, own)| sum + v.abs() * own)))
+        Ok(Rate::modulus(self.sides.rate(p, v)?))
     }
 
     fn report(&self) -> &Report {

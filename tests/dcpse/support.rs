@@ -2,8 +2,8 @@
 
 use parops::{
     Apply, BruteForce, CellList, Cutoff, DcPse, Domain, Epsilon, ErrorKind, Expression, Fallback, GROWTH, Gradient,
-    Histogram, Laplacian, MultiIndex, Nearest, Neighbors, OperatorError, Particles, Random, Rows, Several, Sign,
-    testing::Promise,
+    Histogram, Laplacian, MultiIndex, Nearest, Neighbors, OperatorError, Particles, Random, Rows, Selected, Several,
+    Sign, testing::Promise,
 };
 
 type Failure = Result<(), parops::Error>;
@@ -336,4 +336,24 @@ fn no_cutoff_is_named_that_the_domain_does_not_admit() {
         let error = method.assemble(&cells).unwrap_err();
         assert_eq!(error.wanted_cutoff(), wanted, "{cutoff}: {error}");
     }
+}
+
+#[test]
+fn neighbors_at_the_place_of_the_particle_are_named() -> Failure {
+    let mut points = Particles::jittered([0.0; 2], [1.0; 2], [10; 2], 0.3, 1)?.points().to_vec();
+    let place = points[50];
+    points.extend([place; 20]);
+    let particles = Particles::new(points)?;
+    let neighbors = Nearest::build(&particles, &Domain::open(), 18)?;
+    // The corner 4 of the set determines all conditions, 50 none.
+    let neighbors = Selected::new(&neighbors, &[4, 50])?;
+    let dcpse = DcPse::<Laplacian<2>, 2>::new();
+    for lower in [Fallback::Refuse, Fallback::LowerOrder] {
+        let refused = dcpse.clone().fallback(lower).assemble(&neighbors).unwrap_err();
+        assert_eq!(*refused.kind(), ErrorKind::Operator(OperatorError::OnePlace { neighbors: 20 }));
+        assert_eq!((refused.particle(), refused.wanted_cutoff()), (Some(1), None));
+    }
+    let rows = dcpse.fallback(Fallback::Empty).assemble(&neighbors)?;
+    assert_eq!((rows.report().rows, rows.report().empty), (2, 1));
+    Ok(())
 }

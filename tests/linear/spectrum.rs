@@ -226,6 +226,23 @@ fn chain_torn_by_rounding_is_within_its_error() -> Result<()> {
 }
 
 #[test]
+fn rounding_of_all_eigenvalues_is_within_the_error() -> Result<()> {
+    // Circulants: every eigenvalue has the condition 1, and none lies right of 0.
+    let (left, right) = (|n: usize, p: usize| (p + n - 1) % n, |n: usize, p: usize| (p + 1) % n);
+    for n in [100, 300, 640] {
+        let upwind = |p: usize| vec![(p, p, -1.0), (p, left(n, p), 1.0)];
+        let central = |p: usize| vec![(p, left(n, p), 0.5), (p, right(n, p), -0.5)];
+        let second = |p: usize| vec![(p, left(n, p), 1.0), (p, p, -2.0), (p, right(n, p), 1.0)];
+        for row in [&upwind as &dyn Fn(usize) -> Vec<(usize, usize, f64)>, &central, &second] {
+            let found = SpectrumEstimator::new().of(&CsrMatrix::from_triplets(n, n, (0..n).flat_map(row))?)?;
+            assert!(found.exact && found.abscissa <= found.error, "{n}: {found:?}");
+            assert!(found.error < 1e-10 * found.radius, "{n}: {found:?}");
+        }
+    }
+    Ok(())
+}
+
+#[test]
 fn maps_of_subnormal_numbers_are_found_too() -> Result<()> {
     for scale in [1e-309, 1e-312, 1e-318] {
         for n in [1, 5, 40] {

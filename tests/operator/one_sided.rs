@@ -279,6 +279,29 @@ fn first_derivative_of_order_one_has_weights_of_one_sign_and_exact_linear_functi
     Ok(())
 }
 
+#[test]
+fn neighbors_across_the_axis_but_for_rounding_are_on_no_side() -> Failure {
+    // A lattice turned by 90 degrees: columns are straight to 1e-17.
+    let (sine, cosine) = std::f64::consts::FRAC_PI_2.sin_cos();
+    let lattice = Particles::lattice([0.0; 2], [1.0; 2], [12; 2])?;
+    let turned = lattice.points().iter().map(|x| [cosine * x[0] - sine * x[1], sine * x[0] + cosine * x[1]]).collect();
+    let set = Particles::<2>::new(turned)?.with_equal_volumes(1.0)?;
+    let epsilon = Epsilon::global(1.0 / 12.0)?;
+    let rim = (0..set.len()).filter(|&p| set.points()[p][0] > -0.05).collect::<Vec<_>>();
+    assert_eq!(rim.len(), 12);
+
+    let right = OneSided::new(D2::<1, 0>::default(), Side::Right, 1, epsilon.clone(), set.volumes()?)?.support(3.0)?;
+    let neighbors = CellList::build(&set, &Domain::open(), right.cutoff())?;
+    let refused = right.allow(Allowance::Everywhere).assemble(&neighbors).unwrap_err();
+    assert!(rim.contains(&refused.particle().unwrap()), "{refused}");
+    assert!(matches!(refused.kind(), ErrorKind::Operator(OperatorError::EmptySide { axis: 0, side: Side::Right, .. })));
+
+    let both = UpwindGradient::new(epsilon, set.volumes()?).support(3.0)?.allow(Allowance::Everywhere);
+    let rows: UpwindRows<2> = UpwindRows::assemble(&both, &neighbors)?;
+    assert!(rows.report().spectral_bound < 100.0, "{}", rows.report().spectral_bound);
+    Ok(())
+}
+
 /// The root mean square error of d^beta/dx^beta of a wave on a jittered torus, axis 0.
 fn wave_error<const D: usize>(n: usize, beta: u8, order: u32, ratio: f64, seed: u64) -> Result<f64, Error> {
     let set = Particles::jittered([0.0; D], [1.0; D], [n; D], 0.3, seed)?;

@@ -1,5 +1,6 @@
 //! Scenes, and Eulerian and Lagrangian runs.
 
+mod compressing;
 #[path = "../linear/dense/mod.rs"]
 mod dense;
 mod divergence;
@@ -17,6 +18,7 @@ mod lagrangian;
 mod lagrangian_faults;
 mod lagrangian_growth;
 mod longest_step;
+mod one_sided_limits;
 mod relations;
 mod remeshed;
 mod remeshed_substeps;

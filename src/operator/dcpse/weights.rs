@@ -26,6 +26,9 @@ pub struct DcPseScratch<const D: usize> {
 impl Settings {
     /// 1/epsilon and cutoff/epsilon.
     pub(super) fn scale<const D: usize>(&self, row: &Stencil<D>) -> Result<(f64, f64)> {
+        if row.cutoff() == 0.0 && row.len() > 0 {
+            return Err(OperatorError::OnePlace { neighbors: row.len() }.into());
+        }
         let epsilon = match &self.epsilon {
             Some(epsilon) => epsilon.get(row.target())?,
             None => row.cutoff() / CUTOFF_OVER_EPSILON,
@@ -121,8 +124,9 @@ where
     }
 
     fn can_grow(&self, refusal: &Error) -> bool {
-        use OperatorError::{Singular, TooFew, Uncertified};
-        matches!(refusal.kind(), ErrorKind::Operator(TooFew { .. } | Singular { .. } | Uncertified { .. }))
+        use OperatorError::{OnePlace, Singular, TooFew, Uncertified};
+        let ErrorKind::Operator(refusal) = refusal.kind() else { return false };
+        matches!(refusal, TooFew { .. } | Singular { .. } | Uncertified { .. } | OnePlace { .. })
     }
 
     fn stand_in(&self, draft: &mut Draft<D, [f64; K]>, scratch: &mut DcPseScratch<D>) {
