@@ -43,5 +43,5 @@ fn gamma<const R: u32>(velocity: fn(&[f64; 2], f64) -> [f64; 2]) -> Result<f64> 
     let set = scattered(COARSE)?;
     let near = nearest::<R>(&set)?;
     let (site, flow) = (Site::new(&set, &near)?, |p: usize| velocity(&set.points()[p], 0.0));
-    Ok(stabilized::<R>(COARSE).build::<f64, _>(&site, flow, true, &near)?.gamma())
+    Ok(stabilized::<R>(COARSE).build::<f64, _>(&site, flow, true, true, &near)?.gamma())
 }

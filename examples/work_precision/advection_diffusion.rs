@@ -124,7 +124,7 @@ fn central<const D: usize, const R: u32>(bench: &mut Bench, sides: &[usize]) -> 
     let coarse = scattered::<D>(COARSE[D - 1])?;
     let neighbors = near(&coarse)?;
     let (site, flow) = (Site::new(&coarse, &neighbors)?, |p: usize| velocity(&coarse.points()[p], 0.0));
-    let gamma = stabilized(COARSE[D - 1]).build::<f64, _>(&site, flow, true, &neighbors)?.gamma();
+    let gamma = stabilized(COARSE[D - 1]).build::<f64, _>(&site, flow, true, true, &neighbors)?.gamma();
     for &side in sides {
         let set = scattered::<D>(side)?;
         bench.sample(sample::<D>(side, "DC-PSE", R, "RK4"), |watch, sample| {
