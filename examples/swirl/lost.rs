@@ -10,7 +10,7 @@ use crate::scattered::torus;
 
 /// Particles along an axis, and when the run ends.
 const N: usize = 24;
-const END: f64 = 3.0;
+const END: f64 = 2.0;
 const DT: f64 = 0.02;
 
 /// The worst condition number of a row, the mass less that of the start over it, and when the run is refused by default
