@@ -3,7 +3,7 @@
 use crate::error::{Error, ParticleError, Result};
 
 /// A diffusivity: a constant (`f64`), one number a particle (`Vec<f64>`), or a function of x
-/// (`|x: &[f64; D]| ..`, with its argument written out).
+/// (`|x: &[f64; D]| ..`, with its argument written out). All fields of a run share it.
 ///
 /// ```
 /// use parops::Diffusivity;

@@ -71,7 +71,7 @@ impl<const D: usize> Damping<D> {
         let along = |p: usize, (q, w): (usize, [f64; D])| {
             w.iter().zip(&flow[q]).zip(&flow[p]).map(|((w, v), own)| w * (v - own)).sum::<f64>()
         };
-        (0..flow.len()).map(|p| self.rows.pairs(p).1.into_iter().map(|pair| along(p, pair)).sum()).collect()
+        (0..flow.len()).map(|p| self.rows.pairs(p).1.map(|pair| along(p, pair)).sum()).collect()
     }
 
     /// The gamma that the particles around the fastest one need, with the same margin as an estimate of all.

@@ -108,8 +108,8 @@ impl<const D: usize, const R: u32> Transport<D> for Stabilized<D, R> {
                     flows = (0..D).map(along).collect();
                 }
                 let mut damping = Damping { rows, term: Hyperviscosity::new(laplacian, R, self.h, 0.0)? };
-                let gammas = flows.iter().map(|flow| damping.gamma(flow, solenoidal));
-                gammas.into_iter().try_fold(0.0, |most: f64, gamma| Ok::<_, Error>(most.max(gamma?)))?
+                let larger = |most: f64, flow: &Vec<_>| Ok::<_, Error>(most.max(damping.gamma(flow, solenoidal)?));
+                flows.iter().try_fold(0.0, larger)?
             }
         };
         Ok(StabilizedRows {

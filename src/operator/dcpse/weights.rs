@@ -26,7 +26,7 @@ pub struct DcPseScratch<const D: usize> {
 impl Settings {
     /// 1/epsilon and cutoff/epsilon.
     pub(super) fn scale<const D: usize>(&self, row: &Stencil<D>) -> Result<(f64, f64)> {
-        if row.cutoff() == 0.0 && row.len() > 0 {
+        if row.cutoff() == 0.0 && !row.is_empty() {
             return Err(OperatorError::OnePlace { neighbors: row.len() }.into());
         }
         let epsilon = match &self.epsilon {
