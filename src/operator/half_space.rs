@@ -163,7 +163,7 @@ impl<const D: usize> HalfScratch<D> {
 #[inline(always)]
 pub(super) fn on_side<const D: usize>(z: &[f64; D], axis: usize, side: Side) -> bool {
     let along = side.sign() * z[axis];
-    along > 0.0 && along * along > ACROSS * ACROSS * square(z)
+    z.iter().all(|x| along > ACROSS * x.abs())
 }
 
 #[inline(always)]

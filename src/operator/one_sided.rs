@@ -3,7 +3,7 @@
 use super::allowance::Allowance;
 use super::draft::finite;
 use super::expression::{Operator, collect};
-use super::half_space::{HalfScratch, HalfSpace, half_space_settings};
+use super::half_space::{HalfScratch, HalfSpace, half_space_settings, on_side};
 use super::method::{Method, spread};
 use super::pairwise::times;
 use super::row_report::RowReport;
@@ -133,7 +133,7 @@ impl<const D: usize> Closure<D> {
         let Self { system, moments, nodes, z, w, solution } = self;
         let conditions = system.conditions();
         nodes.clear();
-        nodes.extend((0..half.z.len()).filter(|&q| side.sign() * half.z[q][axis] > 0.0));
+        nodes.extend((0..half.z.len()).filter(|&q| on_side(&half.z[q], axis, side)));
         if nodes.is_empty() {
             return Err(OperatorError::EmptySide { axis, side, neighbors: half.z.len() }.into());
         }

@@ -95,8 +95,11 @@ impl<const D: usize> Judge<D> for Corrected<D> {
             }
             OperatorError::Window { ratio, low, high } => {
                 let alike = stencils.iter().any(|stencil| stencil.cutoff() / self.epsilon(stencil) == ratio);
-                (low, high) == (1.0, 6.0) && (alike || ratio.is_nan()) && !(low <= ratio && ratio <= high)
+                (low, high) == (1.0, 6.0) && alike && !(low <= ratio && ratio <= high)
             }
+            OperatorError::OnePlace { neighbors } => stencils.iter().any(|stencil| {
+                stencil.len() == neighbors && stencil.separations().iter().all(|s| s.iter().all(|&x| x == 0.0))
+            }),
             OperatorError::Uncertified { neighbors, conditions, rank, condition, residual, .. } => {
                 let alike = stencils.iter().rev().find(|stencil| stencil.len() == neighbors);
                 // Such a residual is within all gates, because the terms add up to max|b| at least.

@@ -28,7 +28,10 @@ impl<const D: usize> Judge<D> for OneWay<D> {
         let inverse = 1.0 / self.epsilon.get(p);
         match *error.kind() {
             ErrorKind::Operator(OperatorError::EmptySide { axis, side, neighbors }) => {
-                let on = stencil.separations().iter().any(|s| side.sign() * (s[axis] * inverse) > 0.0);
+                let on = stencil.separations().iter().any(|s| {
+                    let along = side.sign() * (s[axis] * inverse);
+                    s.iter().all(|x| along > 1e-12 * (x * inverse).abs())
+                });
                 neighbors == stencil.len() && Side::upwind(self.velocities[p][axis]) == Some(side) && !on
             }
             ErrorKind::Operator(OperatorError::Moment { defect, limit }) => {
