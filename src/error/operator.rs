@@ -103,7 +103,7 @@ kinds! {
             /// Rank of the conditions on this stencil.
             rank: usize,
         } => "the {neighbors} neighbors give the {conditions} moment conditions rank {rank} only",
-        /// No neighbor but at the place of the particle.
+        /// No neighbor but at the place of the particle, or so near that the square of the distance is 0.
         OnePlace {
             /// Number of neighbors n.
             neighbors: usize,

@@ -98,7 +98,7 @@ impl<const D: usize> Judge<D> for Corrected<D> {
                 (low, high) == (1.0, 6.0) && alike && !(low <= ratio && ratio <= high)
             }
             OperatorError::OnePlace { neighbors } => stencils.iter().any(|stencil| {
-                stencil.len() == neighbors && stencil.separations().iter().all(|s| s.iter().all(|&x| x == 0.0))
+                stencil.len() == neighbors && stencil.separations().iter().all(|s| square(s) == 0.0)
             }),
             OperatorError::Uncertified { neighbors, conditions, rank, condition, residual, .. } => {
                 let alike = stencils.iter().rev().find(|stencil| stencil.len() == neighbors);
