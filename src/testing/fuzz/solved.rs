@@ -97,9 +97,9 @@ impl<const D: usize> Judge<D> for Corrected<D> {
                 let alike = stencils.iter().any(|stencil| stencil.cutoff() / self.epsilon(stencil) == ratio);
                 (low, high) == (1.0, 6.0) && alike && !(low <= ratio && ratio <= high)
             }
-            OperatorError::OnePlace { neighbors } => stencils.iter().any(|stencil| {
-                stencil.len() == neighbors && stencil.separations().iter().all(|s| square(s) == 0.0)
-            }),
+            OperatorError::OnePlace { neighbors } => stencils
+                .iter()
+                .any(|stencil| stencil.len() == neighbors && stencil.separations().iter().all(|s| square(s) == 0.0)),
             OperatorError::Uncertified { neighbors, conditions, rank, condition, residual, .. } => {
                 let alike = stencils.iter().rev().find(|stencil| stencil.len() == neighbors);
                 // Such a residual is within all gates, because the terms add up to max|b| at least.
