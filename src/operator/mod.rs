@@ -42,5 +42,4 @@ pub(crate) use screened::{Facing, Screen, Screened};
 pub use several::Several;
 pub use sph::{Differentiated, Sph, SphForm};
 pub use typed::{Homogeneous, Plus, Times};
-pub(crate) use upwind::UpwindSides;
 pub use upwind::{Upwind, UpwindGradient, UpwindScratch};

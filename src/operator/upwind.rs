@@ -153,88 +153,24 @@ impl<const D: usize> Method<D> for Upwind<D> {
 #[derive(Clone, Debug)]
 pub struct UpwindGradient<const D: usize> {
     half: HalfSpace,
+    /// Where there is one, sides that it does not come from have no weights.
+    flow: Option<Arc<[[f64; D]]>>,
 }
 
 impl<const D: usize> UpwindGradient<D> {
     /// The derivatives with this smoothing length and these volumes.
     pub fn new(epsilon: Epsilon, volumes: &Volumes) -> Self {
-        Self { half: HalfSpace::new(epsilon, volumes) }
+        Self { half: HalfSpace::new(epsilon, volumes), flow: None }
     }
 
-    /// The weights of the sides that are `wanted`, zeros on the others.
-    fn weights_of(
-        &self,
-        row: &Stencil<D>,
-        half: &mut HalfScratch<D>,
-        w: &mut [[f64; D]],
-        diagonal: &mut [f64; D],
-        wanted: impl Fn(usize, Side) -> bool,
-    ) -> Result<()> {
-        let inverse = self.half.prepare(row, half)?;
-        if let Some(odd) = row.iter().find(|neighbor| neighbor.sign != 1) {
-            return Err(OperatorError::OddImage { q: odd.q }.into());
-        }
-        *diagonal = [0.0; D];
-        w.fill([0.0; D]);
-        for axis in 0..D {
-            for side in [Side::Left, Side::Right] {
-                // An empty side is refused when a velocity asks for it.
-                if wanted(axis, side) && half.z.iter().any(|z| on_side(z, axis, side)) {
-                    half.slope(axis, side)?;
-                    w.iter_mut().zip(&half.w).for_each(|(w, &slope)| w[axis] += slope * inverse);
-                }
-            }
-        }
-        finite(row, w.iter().map(<[f64; D]>::as_slice), diagonal)
+    /// The derivatives from the sides alone that these velocities, one per target, come from: a flow that stays has no use for
+    /// the others, however irregular they are.
+    pub(crate) fn of_flow(&self, velocities: Vec<[f64; D]>) -> Self {
+        Self { flow: Some(velocities.into()), ..self.clone() }
     }
 }
 
 half_space_settings!(UpwindGradient);
-
-/// The same from the sides alone that `wanted(target, axis, side)`: a flow that stays has no use for the others, however
-/// irregular they are.
-#[derive(Clone, Debug)]
-pub(crate) struct UpwindSides<'a, F, const D: usize> {
-    pub(crate) gradient: &'a UpwindGradient<D>,
-    pub(crate) wanted: F,
-}
-
-impl<F: Fn(usize, usize, Side) -> bool + Sync, const D: usize> Method<D> for UpwindSides<'_, F, D> {
-    type Out = [f64; D];
-    type Scratch = UpwindScratch<D>;
-
-    fn scratch(&self) -> Result<UpwindScratch<D>> {
-        self.gradient.scratch()
-    }
-
-    fn validate(&self, targets: usize, sources: usize) -> Result<()> {
-        self.gradient.validate(targets, sources)
-    }
-
-    fn cutoff(&self, p: usize) -> Result<Option<f64>> {
-        Method::cutoff(self.gradient, p)
-    }
-
-    fn weights(
-        &self,
-        row: &Stencil<D>,
-        UpwindScratch(half): &mut UpwindScratch<D>,
-        w: &mut [[f64; D]],
-        diagonal: &mut [f64; D],
-    ) -> Result<()> {
-        self.gradient.weights_of(row, half, w, diagonal, |axis, side| (self.wanted)(row.target(), axis, side))
-    }
-
-    fn report(
-        &self,
-        row: &Stencil<D>,
-        scratch: &UpwindScratch<D>,
-        w: &[[f64; D]],
-        diagonal: &[f64; D],
-    ) -> Result<RowReport> {
-        self.gradient.report(row, scratch, w, diagonal)
-    }
-}
 
 impl<const D: usize> Method<D> for UpwindGradient<D> {
     type Out = [f64; D];
@@ -261,7 +197,24 @@ impl<const D: usize> Method<D> for UpwindGradient<D> {
         w: &mut [[f64; D]],
         diagonal: &mut [f64; D],
     ) -> Result<()> {
-        self.weights_of(row, half, w, diagonal, |_, _| true)
+        let inverse = self.half.prepare(row, half)?;
+        if let Some(odd) = row.iter().find(|neighbor| neighbor.sign != 1) {
+            return Err(OperatorError::OddImage { q: odd.q }.into());
+        }
+        let velocity = self.flow.as_ref().and_then(|flow| flow.get(row.target()));
+        *diagonal = [0.0; D];
+        w.fill([0.0; D]);
+        for axis in 0..D {
+            for side in [Side::Left, Side::Right] {
+                let wanted = velocity.is_none_or(|v| Side::upwind(v[axis]) == Some(side));
+                // An empty side is refused when a velocity asks for it.
+                if wanted && half.z.iter().any(|z| on_side(z, axis, side)) {
+                    half.slope(axis, side)?;
+                    w.iter_mut().zip(&half.w).for_each(|(w, &slope)| w[axis] += slope * inverse);
+                }
+            }
+        }
+        finite(row, w.iter().map(<[f64; D]>::as_slice), diagonal)
     }
 
     fn report(

@@ -41,7 +41,8 @@ impl<const D: usize> Damping<D> {
         let divergence = if solenoidal { vec![0.0; flow.len()] } else { self.divergence(flow) };
         let fastest = flow.iter().map(length).fold(0.0, f64::max);
         let left = COMPRESSED / 2.0 * divergence.iter().copied().fold(0.0, f64::max);
-        let growth = if left > 0.0 { left * self.term.spacing().0 / fastest } else { NONE };
+        // At rest the quotient is no number, and the other is taken.
+        let growth = (left * self.term.spacing().0 / fastest).max(NONE);
         let coarse = growth.max(GROWTH);
 
         let estimator = SpectrumEstimator::new().subspace(VECTORS).most(PRODUCTS);

@@ -10,9 +10,8 @@ use super::transport::{Transport, TransportRows};
 use crate::apply::{Report, Rows};
 use crate::error::Result;
 use crate::neighbors::Neighbors;
-use crate::operator::{UpwindGradient, UpwindSides};
+use crate::operator::UpwindGradient;
 use crate::scalar::{Scalar, length};
-use crate::stencil::Side;
 
 /// The rows of the upwind scheme of order 1, for any velocity.
 ///
@@ -39,11 +38,10 @@ impl<const D: usize> Transport<D> for UpwindGradient<D> {
         neighbors: &P,
     ) -> Result<OneSidedRows<D, E>> {
         let still = still((0..site.points().len()).map(&flow));
-        // A steady flow leaves out the sides it does not come from.
-        let from = |v: f64, side| v.abs() > still && Side::upwind(v) == Some(side);
-        let wanted = |p: usize, axis: usize, side| !steady || from(flow(p)[axis], side);
-        let method = UpwindSides { gradient: self, wanted };
-        let rows: Rows<[f64; D], E::Scalar> = Rows::assemble(&site.screened(&method), neighbors)?;
+        let settled = |p: usize| flow(p).map(|v| if v.abs() > still { v } else { 0.0 });
+        let of_flow = steady.then(|| self.of_flow((0..site.points().len()).map(settled).collect()));
+        let method = of_flow.as_ref().unwrap_or(self);
+        let rows: Rows<[f64; D], E::Scalar> = Rows::assemble(&site.screened(method), neighbors)?;
         let sums = |p| {
             let mut sums = [[0.0_f64; 2]; D];
             for (_, w) in rows.pairs(p).1 {
